@@ -44,6 +44,7 @@ PluginKind = Literal[
 Hook = Literal[
     "actions",
     "action_executors",
+    "handovers",
     "mavlink_components",
     "preflight_checks",
     "report_sections",
@@ -151,6 +152,8 @@ class Extension:
     """`module:Class` of each further kind of `messages.actions.Action` of a waypoint."""
     action_executors: tuple[str, ...] = ()
     """`module:Class` of each `mission.action_executor.ActionExecutor` that performs them."""
+    handovers: tuple[str, ...] = ()
+    """`module:Class` of a `mission.handover.Handover` of waypoints; the first of all is used."""
     preflight_checks: tuple[str, ...] = ()
     """`module:function` of items of the list before take-off: each gets a robot's limits and its
     preflight settings, and returns a `mission.safety.checklist.PreflightCheck`."""

@@ -19,7 +19,6 @@ from aerodaas.geometry.braking import stopping_point
 from aerodaas.geometry.energy import EnergyMeter, EnergyModel
 from aerodaas.geometry.frames import GeodeticOrigin, Vector
 from aerodaas.messages.mission import RECENT, MissionState, MissionStatus
-from aerodaas.messages.mission_mode import MissionModeVehicle
 from aerodaas.messages.payload import Photo
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import Setpoint, VehicleMode, VehicleState
@@ -47,7 +46,7 @@ from aerodaas.mission.commands import (
     TakeControls,
 )
 from aerodaas.mission.forecast import BatteryForecast
-from aerodaas.mission.handover.handover import HANDED_OVER, Handover
+from aerodaas.mission.handover import HANDED_OVER, HandoverContext, make_handover
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.motion_requests import (
     Fly,
@@ -155,8 +154,9 @@ class Mission:
         self._planning = Planning(self._navigator, robot, self.home, self._meter, self._log)
         self._route = Route(self.fence, limits, self.home, clearance)
         self._cornering = Cornering(self._navigator, self._actions, self._route, limits)
-        autonomous = payload if isinstance(payload, MissionModeVehicle) else None
-        self.handover = Handover(autonomous, robot, self._route, clearance, self._log)
+        self.handover = make_handover(
+            HandoverContext(payload, robot, self._route, clearance, self._log)
+        )
         self._command_handler = CommandHandler(self._navigator, self._log)
         self._assessment = CALM
         self._forecast = BatteryForecast(limits, self.home, self._meter, self._log)

@@ -18,7 +18,17 @@ from aerodaas.messages.mission import MissionState as S
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
 from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
-from aerodaas.mission.commands import ClearNavigation, Command, End, ReturnHome, StreamItem
+from aerodaas.mission.commands import (
+    Actuate,
+    ClearNavigation,
+    Command,
+    End,
+    HandOver,
+    ReleaseParachute,
+    ReturnHome,
+    StreamItem,
+    TakeBack,
+)
 from aerodaas.mission.navigation.planner import BackgroundPlanner
 from aerodaas.mission.navigation.queue import WaypointQueue
 from aerodaas.mission.safety.neighbours import Neighbour
@@ -542,3 +552,22 @@ def test_what_a_command_raises_is_its_own_failure() -> None:
     assert len(one.status.visited) == 4
     assert one.vehicle.mode is VehicleMode.GROUNDED
     assert one.now > NANOSECONDS
+
+
+@pytest.mark.parametrize(
+    "asked", [HandOver(), TakeBack(), Actuate("hook", "release"), ReleaseParachute("chute")]
+)
+def test_a_command_of_an_extension_that_is_absent_is_refused(
+    monkeypatch: pytest.MonkeyPatch, asked: Command
+) -> None:
+    """The mission flies on."""
+    monkeypatch.setattr("aerodaas.mission.handover.added", lambda _: [])
+    monkeypatch.setattr("aerodaas.mission.action_executor.added", lambda _: [])
+    one = flight(add(Waypoint("a", 5, 0, 2)))
+    one.run_to(S.ENROUTE)
+    answer = one.tell(asked)
+    assert not answer.accepted
+    assert "this installation" in answer.text
+    one.run()
+    one.expect(S.LANDED)
+    assert tuple(one.status.visited) == ("a",)

@@ -9,14 +9,13 @@ and the first setpoint, or order to return or land, ends the vehicle's mission m
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.clock import seconds
-from aerodaas.config.sections.robot import LimitsConfig, RobotConfig
+from aerodaas.config.sections.robot import LimitsConfig
 from aerodaas.errors import VehicleError
 from aerodaas.geometry.frames import Vector
 from aerodaas.messages.mission import MissionState
@@ -28,13 +27,13 @@ from aerodaas.messages.mission_mode import (
 )
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.mission.commands import Answer, HandOver, TakeBack
-from aerodaas.mission.log import MissionLog
+from aerodaas.mission.handover import HANDED_OVER, Handover, HandoverContext
 from aerodaas.mission.navigation.queue import QueuedWaypoint
 from aerodaas.mission.navigation.route import Route
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.supervisor import has_position
 
-__all__ = ["HANDED_OVER", "Handover", "planned_places", "unflyable"]
+__all__ = ["AutopilotHandover", "planned_places", "unflyable"]
 
 _NAMED = 3
 """Most reasons that are named."""
@@ -109,8 +108,6 @@ def _too_low(start: Vector, end: Vector, clearance: GroundClearance) -> str:
     return f"the way there comes nearer to the ground than {clearance.clearance:g} m"
 
 
-HANDED_OVER = frozenset({MissionState.ENROUTE, MissionState.LOITERING, MissionState.DIVERTED})
-"""States of a mission that flies by waypoints, from which and in which they are handed over."""
 _STEERED = frozenset({VehicleMode.GUIDED, VehicleMode.HOLDING})
 """Modes of a vehicle that follows setpoints, or is about to."""
 _KIND = "handover"
@@ -123,35 +120,38 @@ _UPLOADS = 3
 """How often the rest of a plan is uploaded, where waypoints are reached meanwhile."""
 
 
-@dataclass(slots=True)
-class Handover:
-    """Hand-over of one mission, called by it once a turn."""
+class AutopilotHandover(Handover):
+    """Handover of one mission's waypoints to the autopilot."""
 
-    vehicle: MissionModeVehicle | None
-    """Uses the mission mode of this one; None for a vehicle that has none."""
-    robot: RobotConfig
-    route: Route
-    clearance: GroundClearance | None
-    log: MissionLog
-    flies: bool = False
-    """Whether the autopilot flies."""
-    _stops: list[QueuedWaypoint] = field(default_factory=list)
-    """What was uploaded; empty while nothing is handed over."""
-    _places: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
-    _nearest: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    """Metres from each of them at which the drone was since the autopilot flies."""
-    _hovers: bool = False
-    """Whether it stays at a waypoint."""
-    _done: int = 0
-    _uploads: int = 0
-    _nearer_at: int = 0
-    """Mission clock at which it last came nearer to the next one, nanoseconds."""
-    _approach: float = np.inf
+    def __init__(self, context: HandoverContext) -> None:
+        """Use the mission mode of the vehicle, if it has one."""
+        super().__init__(context)
+        vehicle = context.vehicle
+        # Once: to ask a protocol about an object looks up all its members each time.
+        self._vehicle = vehicle if isinstance(vehicle, MissionModeVehicle) else None
+        self._flies = False
+        self._stops: list[QueuedWaypoint] = []
+        """What was uploaded; empty while nothing is handed over."""
+        self._places: NDArray[np.float64] = np.empty((0, 3))
+        self._nearest: NDArray[np.float64] = np.empty(0)
+        """Metres from each of them at which the drone was since the autopilot flies."""
+        self._hovers = False
+        """Whether it stays at a waypoint."""
+        self._done = 0
+        self._uploads = 0
+        self._nearer_at = 0
+        """Mission clock at which it last came nearer to the next one, nanoseconds."""
+        self._approach = np.inf
 
     @property
     def active(self) -> bool:
         """Whether waypoints are handed over, or about to be."""
         return bool(self._stops)
+
+    @property
+    def flies(self) -> bool:
+        """Whether the autopilot flies."""
+        return self._flies
 
     def handle(
         self,
@@ -160,18 +160,9 @@ class Handover:
         stops: Sequence[QueuedWaypoint],
         state: VehicleState | None,
         now: int,
-        objection: str = "",
+        ongoing: str = "",
     ) -> Answer:
-        """Begin to hand `stops` over, or take them back; the latter takes effect with this turn.
-
-        Args:
-            command: What is asked for.
-            mission: The mission's state; only in flight to a stop are stops handed over.
-            stops: The stops ahead, in the order flown.
-            state: The vehicle's state; None if it has never given one.
-            now: Mission clock, nanoseconds.
-            objection: What the mission itself has against it.
-        """
+        """Begin to upload the stops, or take them back."""
         if isinstance(command, TakeBack):
             if not self.active:
                 return Answer(accepted=False, text="the autopilot flies none of its waypoints")
@@ -183,7 +174,7 @@ class Handover:
             text = f"waypoints are handed over in flight to one, and the drone is {mission.value}"
             return Answer(accepted=False, text=text)
         self._uploads = 0
-        text = objection or self._upload(list(stops), state)
+        text = ongoing or self._upload(list(stops), state)
         return Answer(not text, text and f"the autopilot cannot fly this: {text}")
 
     def situation(self, stop: QueuedWaypoint) -> tuple[MissionState, str]:
@@ -193,19 +184,19 @@ class Handover:
         return MissionState.ENROUTE, f"flying to {stop.id} by the autopilot's mission mode"
 
     def _mode(self) -> MissionMode | None:
-        return None if self.vehicle is None else self.vehicle.mission_mode
+        return None if self._vehicle is None else self._vehicle.mission_mode
 
     def _upload(self, stops: list[QueuedWaypoint], state: VehicleState) -> str:
         """Begin to upload `stops`; returns why not, empty if it is under way."""
-        mode, limits = self._mode(), self.robot.limits
-        if self.vehicle is None or mode is None:
-            return f"its driver, {self.robot.driver}, knows no mission mode"
+        mode, limits = self._mode(), self.context.robot.limits
+        if self._vehicle is None or mode is None:
+            return f"its driver, {self.context.robot.driver}, knows no mission mode"
         if state.mode not in _STEERED or not has_position(state):
             return f"the vehicle is {state.mode.value}"
         position = state.odometry.position
-        if text := unflyable(stops, position, limits, self.route, self.clearance):
+        if text := unflyable(stops, position, limits, self.context.route, self.context.clearance):
             return text
-        places = planned_places(stops, limits, self.vehicle.capabilities.max_speed)
+        places = planned_places(stops, limits, self._vehicle.capabilities.max_speed)
         if text := mode.objection(places):
             return text
         try:
@@ -229,10 +220,10 @@ class Handover:
             return
         if mode := self._mode():
             mode.clear()
-        what = "the hand-over has ended" if self.flies else "not handed over"
-        self.log.alert(now, _KIND, f"{what}: {reason}")
+        what = "the hand-over has ended" if self._flies else "not handed over"
+        self.context.log.alert(now, _KIND, f"{what}: {reason}")
         self._stops = []
-        self.flies = self._hovers = False
+        self._flies = self._hovers = False
 
     def step(self, stops: Sequence[QueuedWaypoint], state: VehicleState, now: int) -> bool:
         """Follow how far the hand-over is; a plan that has changed on the way is taken back.
@@ -254,11 +245,11 @@ class Handover:
             self.take_back(progress.fault, now)
         elif queued == ahead:
             self._advance(mode, progress.phase, state, now)
-        elif self.flies or queued != ahead[-len(queued) :] or self._uploads == _UPLOADS:
+        elif self._flies or queued != ahead[-len(queued) :] or self._uploads == _UPLOADS:
             self.take_back("what is to be flown has changed", now)
         elif text := self._upload(queued, state):
             self.take_back(text, now)
-        return self.flies
+        return self._flies
 
     def _advance(
         self, mode: MissionMode, phase: MissionModePhase, state: VehicleState, now: int
@@ -268,12 +259,12 @@ class Handover:
                 mode.start()
             except VehicleError as error:
                 self.take_back(str(error), now)
-        elif phase is MissionModePhase.FLYING and not self.flies:
-            self.flies, self._nearer_at, self._approach = True, now, np.inf
+        elif phase is MissionModePhase.FLYING and not self._flies:
+            self._flies, self._nearer_at, self._approach = True, now, np.inf
             count = len(self._stops)
             some = f"{count} waypoint{'s' if count > 1 else ''}"
-            self.log.alert(now, _KIND, f"handed over to the autopilot: {some}")
-        elif self.flies and (
+            self.context.log.alert(now, _KIND, f"handed over to the autopilot: {some}")
+        elif self._flies and (
             phase is not MissionModePhase.FLYING
             or state.mode not in {VehicleMode.MISSION, VehicleMode.LOST}
         ):
@@ -290,9 +281,9 @@ class Handover:
             elapsed: Time since the last turn, seconds.
         """
         mode = self._mode()
-        if mode is None or not self.flies or not has_position(state):
+        if mode is None or not self._flies or not has_position(state):
             return []
-        progress, radius = mode.progress, self.robot.limits.arrival_radius
+        progress, radius = mode.progress, self.context.robot.limits.arrival_radius
         distances = np.linalg.norm(self._places - state.odometry.position, axis=1)
         self._nearest = np.minimum(self._nearest, distances)
         reached: list[QueuedWaypoint] = []
@@ -317,7 +308,7 @@ class Handover:
 
     def _watch(self, distance: float, radius: float, now: int, elapsed: float) -> None:
         """Count the stay at the next stop, and miss what does not come nearer to it."""
-        stop, patience = self._stops[self._done], self.robot.mission.stall_timeout
+        stop, patience = self._stops[self._done], self.context.robot.mission.stall_timeout
         self._hovers = distance <= radius and stop.remaining_hover > 0.0
         if self._hovers:
             stop.remaining_hover -= elapsed

@@ -1,0 +1,1 @@
+"""Waypoints handed over to the autopilot's own mission mode."""
