@@ -162,6 +162,7 @@ class MavlinkVehicle:
             on_component=self.payload.take_component,
             healthy=self._watchdog.healthy,
             stands=self._stands,
+            messages=self._telemetry.messages | self._handlers.keys(),
             equipment={name: one.senders for one in self._components for name in one.handlers},
         )
         link.open()

@@ -55,6 +55,7 @@ class World:
             on_turn=self.turns.append,
             healthy=lambda _: self.healthy,
             stands=lambda: self.stands,
+            messages=("HEARTBEAT", "ATTITUDE"),
         )
         self.link.open()
         self._others: dict[tuple[int, int], Any] = {}

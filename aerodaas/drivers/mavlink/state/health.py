@@ -121,6 +121,11 @@ class Health:
             "SYS_STATUS": self._sensors,
         }
 
+    @property
+    def messages(self) -> frozenset[str]:
+        """Names of the messages that it processes."""
+        return frozenset(self._takers)
+
     def on_message(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
         """Process a message of any kind.
 

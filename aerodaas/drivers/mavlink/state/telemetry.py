@@ -126,6 +126,11 @@ class Telemetry:
             "DISTANCE_SENSOR": self._distance,
         }
 
+    @property
+    def messages(self) -> frozenset[str]:
+        """Names of the messages that update it."""
+        return frozenset((*self._takers, *self.health.messages))
+
     def on_message(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
         """Update by a message of the vehicle.
 

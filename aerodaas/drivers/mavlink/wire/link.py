@@ -42,36 +42,6 @@ _FRAMERS = 16
 _TOLD = 10.0
 """Seconds for which refused packets are reported."""
 
-_WANTED = frozenset(
-    {
-        *(mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_SYS_STATUS),
-        *(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME, mavlink.MAVLINK_MSG_ID_TIMESYNC),
-        mavlink.MAVLINK_MSG_ID_PARAM_VALUE,
-        *(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, mavlink.MAVLINK_MSG_ID_ATTITUDE),
-        *(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT),
-        *(mavlink.MAVLINK_MSG_ID_MISSION_COUNT, mavlink.MAVLINK_MSG_ID_MISSION_REQUEST),
-        *(mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT, mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT),
-        *(mavlink.MAVLINK_MSG_ID_MISSION_ACK, mavlink.MAVLINK_MSG_ID_COMMAND_ACK),
-        *(mavlink.MAVLINK_MSG_ID_HOME_POSITION, mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE),
-        *(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, mavlink.MAVLINK_MSG_ID_STATUSTEXT),
-        *(mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS, mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT),
-        mavlink.MAVLINK_MSG_ID_FENCE_STATUS,
-        *(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, mavlink.MAVLINK_MSG_ID_VIBRATION),
-        *(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED),
-        *(mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION, mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED),
-        *(mavlink.MAVLINK_MSG_ID_CAMERA_FEEDBACK, mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION),
-        *(
-            mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION,
-            mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION,
-            mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS,
-        ),
-        mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS,
-        *(mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, mavlink.MAVLINK_MSG_ID_RELAY_STATUS),
-        *(mavlink.MAVLINK_MSG_ID_SMART_BATTERY_INFO, mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR),
-        EventMessage.id,
-    }
-)
-"""Messages that the driver processes; those of a listener and of equipment come on top."""
 _MESSAGE_IDS = {message.msgname: number for number, message in mavlink.mavlink_map.items()} | {
     EventMessage.msgname: EventMessage.id
 }
@@ -125,12 +95,14 @@ class MavlinkLink:
         on_component: Callable[[Message, float], None] = lambda *_: None,
         healthy: Callable[[float], bool],
         stands: Callable[[], bool],
+        messages: Collection[str],
         equipment: Mapping[str, Collection[int]] = MappingProxyType({}),
     ) -> None:
         """Prepare the link of robot `name`; raises ConfigError for a bad key. Opens nothing.
 
-        `equipment` has names of messages that equipment beside the autopilot brings, with ids of
-        the components from which they are heard, too.
+        `messages` are the names of those that the driver processes; those of a listener come on
+        top. `equipment` has names of messages that equipment beside the autopilot brings, with ids
+        of the components from which they are heard, too.
         """
         self.counts = LinkCounts()
         self._name = name
@@ -149,7 +121,7 @@ class MavlinkLink:
         self.pins = SenderPins(lambda: self.key is not None or stands())
         self._refused_at = -math.inf
         self._equipment = equipment
-        self._wanted = {*_WANTED, *(_MESSAGE_IDS[name] for name in equipment)}
+        self._wanted = {_MESSAGE_IDS[name] for name in (*messages, *equipment)}
         self._framers: dict[Peer, Framer] = {}
         self._lock = threading.Lock()
         self._listeners: list[tuple[frozenset[str], queue.SimpleQueue[Message]]] = []
