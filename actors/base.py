@@ -131,7 +131,8 @@ class NodeActor:
             raise
 
     def _runner(self, node: Node) -> NodeRunner:
-        return NodeRunner(self, node)
+        actor: Any = self  # whose module type checkers know by two names, for its folder is linked
+        return NodeRunner(actor, node)
 
     def info(self) -> ActorInfo:
         """Node, process and streams of the actor."""

@@ -5,21 +5,22 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterable, Mapping
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
-from aerodaas.actors.streams import Publisher, Subscriber
+from aerodaas.actors.streams import Subscriber
 from aerodaas.cameras.base import most_memory
-from aerodaas.clock import Clock
 from aerodaas.errors import AeroDaaSError, as_project_error
 from aerodaas.messages.envelope import Message
 from aerodaas.runtime.memory_limit import limit_memory
 from aerodaas.runtime.node import NEVER, Host, Node
 from aerodaas.runtime.nodes.analysis import AnalysisNode
 from aerodaas.runtime.nodes.camera import CameraNode
-from aerodaas.runtime.reports import AlertLog, StreamCount
-from aerodaas.runtime.session import Session
+from aerodaas.runtime.reports import StreamCount
 
-__all__ = ["NodeRunner", "RunnerActor"]
+if TYPE_CHECKING:
+    from aerodaas.actors.base import NodeActor
+
+__all__ = ["NodeRunner"]
 
 _LONGEST_WAIT = 0.5
 """Wall seconds of one wait for messages, after which a stop is noticed."""
@@ -27,80 +28,10 @@ _HUNG = 5.0
 """Wall seconds on one item before an alert; a first inference may take several."""
 
 
-class RunnerActor(Protocol):
-    """Interface of the actor that a runner steps nodes for."""
-
-    session: Session
-    clock: Clock
-    alerts: AlertLog
-    publishers: dict[str, Publisher]
-
-    @property
-    def stopping(self) -> bool:
-        """True once the actor is to end."""
-        ...
-
-    def reader(
-        self, depths: Mapping[str, int], who: str = "", within: frozenset[str] = frozenset()
-    ) -> Subscriber:
-        """Open streams for reading.
-
-        Args:
-            depths: Queue depths by stream.
-            who: Name of the reader in alerts.
-            within: Streams that this actor publishes itself.
-        """
-        ...
-
-    def publisher(self, stream: str, what: str = "") -> Publisher:
-        """Open a stream for writing.
-
-        Args:
-            stream: Name of the stream.
-            what: Name of its items in alerts; empty for the stream's.
-        """
-        ...
-
-    def publish(self, message: Message[Any]) -> Message[Any]:
-        """Send a message to its readers."""
-        ...
-
-    def alert(self, kind: str, text: str) -> None:
-        """Publish an alert at the current mission time.
-
-        Args:
-            kind: Short machine-readable name.
-            text: One sentence for the operator.
-        """
-        ...
-
-    def publish_alert(
-        self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str = ""
-    ) -> None:
-        """Publish an alert.
-
-        Args:
-            kind: Short machine-readable name.
-            text: One sentence for the operator.
-            stamp: Mission clock, nanoseconds.
-            values: Further figures by name.
-            source: Name of the part that raises it; empty for the actor's own.
-        """
-        ...
-
-    def fail(self, error: Exception) -> None:
-        """End as failed, with an alert."""
-        ...
-
-    def rest(self, seconds: float) -> None:
-        """Wait for so many wall seconds, or until the actor is stopped."""
-        ...
-
-
 class NodeRunner(Host):
     """One node, its subscriber and its publishers; the node's host."""
 
-    def __init__(self, actor: RunnerActor, node: Node) -> None:
+    def __init__(self, actor: NodeActor, node: Node) -> None:
         """Run `node` in `actor`."""
         self.node = node
         self.within: frozenset[str] = frozenset()

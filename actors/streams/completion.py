@@ -50,19 +50,10 @@ class Completion:
     """A reader's side. It never reads the bell, which it shares: each ring is an edge."""
 
     def __init__(self, page: int, bell: int) -> None:
-        """Map the page, whose descriptor is closed; the bell's is kept.
-
-        Raises OSError or ValueError if it is no such page; then both are closed.
-        """
+        """Map the page, whose descriptor is closed; the bell's is kept."""
         self.bell = bell
-        try:
-            memory = mmap.mmap(page, _PAGE, prot=mmap.PROT_READ)
-        except (OSError, ValueError):
-            os.close(bell)
-            raise
-        finally:
-            os.close(page)
-        self._number = memoryview(memory).cast("Q")
+        self._number = memoryview(mmap.mmap(page, _PAGE, prot=mmap.PROT_READ)).cast("Q")
+        os.close(page)
 
     @property
     def number(self) -> int:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import select
 import socket
-import struct
 import time
 import weakref
 from collections import deque
@@ -246,7 +244,7 @@ class LocalSubscriber:
         while link.behind:
             try:
                 data = link.receive()
-            except (ValueError, OSError, struct.error):  # no publisher of ours
+            except (ValueError, OSError):  # no memory or descriptor left
                 data = memoryview(b"")
             if data is None:
                 break
@@ -291,27 +289,7 @@ class LocalSubscriber:
             control.close()
             return
         stream, (descriptor, page, bell) = sent
-        try:
-            completion = Completion(page, bell)
-        except (OSError, ValueError):  # no page
-            os.close(descriptor)
-            control.close()
-            return
-        try:
-            queue = socket.socket(fileno=descriptor)
-        except OSError:  # not a socket
-            os.close(descriptor)
-            completion.close()
-            control.close()
-            return
-        link = _PublisherLink(control, stream, queue, completion)
-        if stream not in self._depths:
-            link.close()
-            return
-        try:
-            self._poll.register(bell, select.EPOLLIN | select.EPOLLET)
-        except OSError:  # nothing that rings
-            link.close()
-            return
+        queue = socket.socket(fileno=descriptor)
+        self._poll.register(bell, select.EPOLLIN | select.EPOLLET)
         self._poll.register(queue, 0)  # its end alone
-        self._links[descriptor] = link
+        self._links[descriptor] = _PublisherLink(control, stream, queue, Completion(page, bell))

@@ -16,7 +16,6 @@ from aerodaas.dataflow.handles import Compute, Here, Sensor
 from aerodaas.dataflow.interfaces import IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.environment.mission_run import MissionRun
 from aerodaas.environment.offering import BuildOnlyMission, note_built, offer
 from aerodaas.environment.robot import Robot
 from aerodaas.environment.run import Run
@@ -33,6 +32,7 @@ from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.trajectory.base import NavigationEntry, TrajectoryScheduler
 
 if TYPE_CHECKING:
+    from aerodaas.environment.provider.run import ProvidedRun
     from aerodaas.service.own.view import ConsoleView
 
 __all__ = ["Environment"]
@@ -66,7 +66,7 @@ class Environment(PaperNames, IEnvironment):
         self.env_data = self.config.model_dump(by_alias=True)
         """The environment file's content, for analyses that want it."""
         self.graph = Graph(sensor.full_id for sensor in self.config.all_sensors())
-        self._mission: MissionRun | None = None
+        self._mission: Run | ProvidedRun | BuildOnlyMission | None = None
         self._speed: Speed | None = None
         self._flights = 0
         self._flown = 0
@@ -420,14 +420,14 @@ class Environment(PaperNames, IEnvironment):
             raise MissionError(f"the provider at {self.path} flies it: call start_mission()")
         return mission
 
-    def launched(self) -> MissionRun:
+    def launched(self) -> Run | ProvidedRun | BuildOnlyMission:
         """Start the mission of every robot that navigates, once; returns it."""
         if self._mission is None and not self._only_built():
             return self._start()
         assert self._mission is not None  # noqa: S101 - it flies, or what stands in for it
         return self._mission
 
-    def launch_again(self) -> MissionRun:
+    def launch_again(self) -> Run | ProvidedRun | BuildOnlyMission:
         """Start the first mission, or the next one after its end; returns a running one.
 
         The next mission flies the navigation given since the last one ended, and the streams of
@@ -451,7 +451,7 @@ class Environment(PaperNames, IEnvironment):
             self._mission, self.graph.reader = unflown, unflown.read
         return True
 
-    def _start(self) -> MissionRun:
+    def _start(self) -> Run | ProvidedRun:
         self.place_entries()
         self._flights += 1
         mission = self._mission = self._prepared()
@@ -463,7 +463,7 @@ class Environment(PaperNames, IEnvironment):
             raise
         return mission
 
-    def _prepared(self) -> MissionRun:
+    def _prepared(self) -> Run | ProvidedRun:
         if self.provider is None:
             return Run(self, self._flights, self._speed)
         from aerodaas.environment.provider.run import ProvidedRun  # noqa: PLC0415 - only then

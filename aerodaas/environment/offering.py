@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from aerodaas.config.options import RunOptions, current_options
-from aerodaas.environment.mission_run import MissionRun
 from aerodaas.errors import GoesOnError, GraphError
 from aerodaas.mission.commands import Command
 
@@ -138,7 +137,7 @@ def require_no_more(environment: Environment) -> None:
         environment.unflown.refuse()
 
 
-class BuildOnlyMission(MissionRun):
+class BuildOnlyMission:
     """Stands in for the mission of an application that is only built: it never flies."""
 
     def __init__(self) -> None:
@@ -151,10 +150,6 @@ class BuildOnlyMission(MissionRun):
     def over(self) -> bool:
         """True: nothing flies."""
         return True
-
-    def start(self) -> NoReturn:
-        """Refuse to fly."""
-        self.refuse()
 
     def wait(self) -> NoReturn:
         """End the application: what comes next belongs to the end of a flight."""

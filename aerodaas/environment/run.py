@@ -18,7 +18,7 @@ from aerodaas.config.extras import require_extra
 from aerodaas.config.model import TaskConfig
 from aerodaas.config.options import LiveViews, Speed, current_options
 from aerodaas.config.plugins import is_built_in, load_plugin
-from aerodaas.environment.mission_run import recording_path
+from aerodaas.environment.recording_paths import recording_path
 from aerodaas.environment.signals import (
     INTERRUPTED,
     TerminatedError,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import array
 import os
 import resource
 import socket
@@ -32,15 +31,14 @@ from aerodaas.actors.streams import (
     shared_memory_available,
 )
 from aerodaas.actors.streams.completion import Publication
-from aerodaas.actors.streams.local_publisher import MAX_BORROWED, LocalPublisher, _ReaderLink
+from aerodaas.actors.streams.local_publisher import MAX_BORROWED, _ReaderLink
 from aerodaas.actors.streams.slots import Slot, SlotPool
-from aerodaas.actors.streams.wire import IN_SLOT, LONGEST, SLOT, TRAILER, packet, send_descriptors
+from aerodaas.actors.streams.wire import LONGEST, packet
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Header
 
 pytestmark = needs(shared_memory_available(), "needs shared memory: `aerodaas doctor`")
 
-ROOT = Path(__file__).resolve().parents[2]
 LARGE = 100_000
 """Bytes that travel in a slot, and are not copied."""
 
@@ -458,92 +456,6 @@ def test_without_descriptors_publishing_goes_on_and_readers_are_found_later() ->
     assert first == "[[[], []], [[], []], [[], []]] True"
     assert second.startswith("[")
     assert third == "[[[4], [4]], [[5], [5]]]"
-
-
-def send_with(descriptors: list[int], data: bytes, to: str) -> socket.socket:
-    """Connect to a socket and send descriptors."""
-    caller = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    caller.connect(to)
-    rights = (socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", descriptors))
-    caller.sendmsg([data], [rights] if descriptors else [])
-    return caller
-
-
-def test_nonsense_on_a_subscribers_socket() -> None:
-    """It is not heard, and the others are."""
-    scope = scope_of_its_own()
-    publisher, subscriber = Publisher(scope, "s"), Subscriber(scope, {"s": 4})
-    assert subscriber._local is not None
-    path = str(subscriber._local._listener._folder / subscriber._local._listener._id)
-    (ours, theirs), pipe = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET), os.pipe()
-    told = Publication()
-    told.complete(1)
-    page, bell, queue = told.page.fileno(), told.bell, theirs.fileno()
-    plain = os.open(__file__, os.O_RDONLY)
-    callers = [
-        send_with([], b"s", path),
-        send_with([queue], b"s", path),
-        send_with([pipe[0], page, bell], b"s", path),
-        send_with([queue, pipe[0], bell], b"s", path),
-        send_with([queue, bell, page], b"s", path),
-        send_with([queue, page, plain], b"s", path),
-        send_with([queue, page, bell, bell], b"s", path),
-        send_with([queue, page, bell], b"another stream", path),
-        send_with([queue, page, bell], b"\xff" * 100, path),
-        socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET),
-    ]
-    callers[-1].connect(path)
-    small = SlotPool()
-    small.acquire(100)
-    beyond = SLOT.pack(1 << 20, 1 << 20, 1 << 20), SLOT.pack(0, 1 << 20, 100), SLOT.pack(0, 0, 0)
-    for data in (b"\1", *(slot + TRAILER.pack(1, IN_SLOT) for slot in beyond)):
-        near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        callers.append(send_with([far.fileno(), page, bell], b"s", path))
-        near.send(data)
-        send_descriptors(callers[-1], "", small.file.fileno())
-        far.close()
-        callers.append(near)
-    publish(publisher, 1)
-    assert [number_in(one) for one in subscriber.receive(5.0)] == [1]
-    publish(publisher, 2, LARGE)
-    assert [number_in(one) for one in subscriber.receive(5.0)] == [2]
-    assert len(subscriber._local._links) == 1
-    for one in (*callers, ours, theirs):
-        one.close()
-    told.close()
-    for descriptor in (plain, *pipe):
-        os.close(descriptor)
-    small.close()
-    subscriber.close()
-    publisher.close()
-
-
-def test_nonsense_in_the_folder_and_from_a_reader() -> None:
-    """The publisher goes on, whatever a reader says."""
-    scope = scope_of_its_own()
-    publisher, subscriber = Publisher(scope, "s"), Subscriber(scope, {"s": 4})
-    local = publisher._local
-    assert isinstance(local, LocalPublisher)
-    listener = rendezvous.Listener(scope)
-    listener.announce("s", 4)
-    folder = Path(local._arrivals._folder)
-    (folder / "no-socket.3").write_text("")
-    (folder / "no-depth").symlink_to(f"../{listener._id}")
-    controls = []
-    for number in range(4):
-        publish(publisher, number, LARGE)
-        control = listener.accept()
-        assert control is not None
-        control.send((b"", b"x", b"x" * 3000, b"\0" * 7)[number])
-        controls.append(control)  # not closed: for what it says it is given up, and found again
-    assert [number_in(one) for one in subscriber.receive(5.0)] == [0, 1, 2, 3]
-    publish(publisher, 4, LARGE)
-    whole, free = slots(publisher)
-    assert [number_in(one) for one in subscriber.receive(5.0)] == [4]
-    assert whole - free <= 2 << 17
-    listener.close()
-    subscriber.close()
-    publisher.close()
 
 
 @pytest.fixture

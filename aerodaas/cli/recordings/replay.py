@@ -55,7 +55,7 @@ def replay(
         aerodaas replay flight.mcap --app follow.py --model other.onnx
         aerodaas replay flight.mcap --app follow.py --scheduler gems
     """
-    from aerodaas.environment.mission_run import recording_folder  # noqa: PLC0415 - slow to load
+    from aerodaas.environment.recording_paths import recording_folder  # noqa: PLC0415 - slow to load
     from aerodaas.recording.pictures import shots  # noqa: PLC0415
     from aerodaas.recording.reader import Recording  # noqa: PLC0415
     from aerodaas.recording.recorded_environment import (  # noqa: PLC0415

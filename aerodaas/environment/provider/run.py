@@ -14,13 +14,13 @@ from pydantic import ValidationError
 from aerodaas.clock import seconds
 from aerodaas.config.extras import require_extra
 from aerodaas.config.options import current_options
-from aerodaas.environment.mission_run import recording_path
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.exchange import pauses
 from aerodaas.environment.provider.follower import MissionFollower
 from aerodaas.environment.provider.here import HereLink, HereServer
 from aerodaas.environment.provider.streams import WireReader
 from aerodaas.environment.provider.submission import submit
+from aerodaas.environment.recording_paths import recording_path
 from aerodaas.environment.signals import TerminatedError, end_of_application, raise_on_signals
 from aerodaas.errors import (
     AeroDaaSError,

@@ -13,7 +13,7 @@ from aerodaas.cli.flying.seeds.figures import rows, show
 from aerodaas.cli.flying.seeds.runs import ApplicationRun, SeededRun, fly_seeds
 from aerodaas.cli.lab.options import write_csv
 from aerodaas.config.options import RunOptions
-from aerodaas.environment.mission_run import recording_folder
+from aerodaas.environment.recording_paths import recording_folder
 from aerodaas.errors import ConfigError, MissionError
 from aerodaas.terminal.progress import show_progress
 

@@ -55,7 +55,7 @@ def import_bag(
     """
     from aerodaas.config.checked import checked  # noqa: PLC0415 - slow to load
     from aerodaas.config.model import RecordingConfig  # noqa: PLC0415
-    from aerodaas.environment.mission_run import recording_folder  # noqa: PLC0415
+    from aerodaas.environment.recording_paths import recording_folder  # noqa: PLC0415
     from aerodaas.extensions.ros2.bags.bag import RosBag  # noqa: PLC0415
     from aerodaas.extensions.ros2.bags.bag_preview import BagTopics  # noqa: PLC0415
     from aerodaas.extensions.ros2.bags.importing import import_bag as write  # noqa: PLC0415

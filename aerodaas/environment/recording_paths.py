@@ -1,54 +1,16 @@
-"""What an environment asks of a flight, whether its own runtime flies it or a provider."""
+"""Where a flight is recorded."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
-from typing import Protocol
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import RunOptions
-from aerodaas.mission.commands import Answer, Command
 
-__all__ = ["MissionRun", "recording_folder", "recording_path"]
+__all__ = ["recording_folder", "recording_path"]
 
 _RECORDING = "flight.mcap"
-
-
-class MissionRun(Protocol):
-    """One flight of an application, from its graph to its recording."""
-
-    on_end: list[Callable[[], None]]
-    """Called once the flight has ended and its recording is closed."""
-
-    @property
-    def over(self) -> bool:
-        """True once every mission has ended."""
-        ...
-
-    def start(self) -> None:
-        """Start, and return once the drones fly; raises the project's errors."""
-        ...
-
-    def command(self, robot: str, command: Command) -> Answer:
-        """Send a robot's mission a command.
-
-        Args:
-            robot: Id of the robot.
-            command: The command, carried out as a whole.
-
-        Returns:
-            The robot's answer.
-
-        Raises:
-            MissionError: Once the run is over.
-        """
-        ...
-
-    def wait(self) -> None:
-        """Return when the flight has ended; raises the error that it ended with."""
-        ...
 
 
 def recording_path(options: RunOptions, config: EnvironmentConfig, number: int) -> Path | None:
