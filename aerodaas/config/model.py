@@ -139,8 +139,6 @@ class RecordingConfig(Strict):
     """H.264 takes a fraction of JPEG's space and more of a processor. PNG loses nothing, so that a
     replay sees what was seen; it takes several times the space."""
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 85
-    h264_quality: Annotated[int, Field(ge=1, le=51)] = 23
-    """x264's constant rate factor: 18 looks like the original, 28 takes half of 23's space."""
     application_source: bool = False
     """Record the application's source as well; by default its file's name and SHA-256 only."""
 

@@ -126,7 +126,7 @@ class Compute(PaperNames, ICompute):
 
         Returns:
             The settings of the environment file (`id`, `kind`, `node`, `executors`,
-            `compression`, `jpeg_quality`, `endpoint` and the resource's own), and the sums over
+            `compression`, `endpoint` and the resource's own), and the sums over
             its nodes of what Ray offers to actors: `nodes`, `cores`, `memory` in bytes, and
             `accelerators`, a number by name such as `{"GPU": 1.0, "H100": 1.0}`. An HTTP endpoint
             has no such sums.

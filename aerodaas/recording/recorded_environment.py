@@ -128,7 +128,7 @@ _ALLOWED: dict[str, Rule] = {
     "compute": [
         {
             "id": _word,
-            **_fields("kind", "simulated", "executors", "compression", "jpeg_quality"),
+            **_fields("kind", "simulated", "executors", "compression"),
         }
     ],
     "schedulers": {

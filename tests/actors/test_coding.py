@@ -50,15 +50,12 @@ def test_lossless_is_lossless(codec: Codec, image: np.ndarray) -> None:
     assert found.header == sent.header
 
 
-def test_a_better_jpeg_is_larger_and_closer() -> None:
+def test_a_jpeg_is_close_and_small() -> None:
     """JPEG is smaller than PNG, and PNG smaller than the pixels."""
     sent = scene()
-    rough, fine = (coded(Codec("jpeg", quality), sent) for quality in (30, 95))
-    errors = [np.abs(decoded(one).image.astype(int) - sent.image).mean() for one in (rough, fine)]
-    assert errors[1] < errors[0] < 10
-    assert errors[1] < 4
-    assert rough.data.size < fine.data.size < coded(Codec("png"), sent).data.size
-    assert coded(Codec("png"), sent).data.size < sent.image.nbytes
+    jpeg, png = coded(Codec("jpeg"), sent), coded(Codec("png"), sent)
+    assert np.abs(decoded(jpeg).image.astype(int) - sent.image).mean() < 4
+    assert jpeg.data.size < png.data.size < sent.image.nbytes
 
 
 def test_what_arrives_damaged_is_told() -> None:

@@ -84,7 +84,6 @@ LOCAL_ALONE = {
     "recording.path",
     "recording.images",
     "recording.jpeg_quality",
-    "recording.h264_quality",
     "remote.host",
     "remote.port",
     "remote.token",

@@ -99,7 +99,6 @@ class ComputeConfig(Strict):
     """Inferences that may run at once."""
     compression: Literal["jpeg", "png", "none"] = "jpeg"
     """Of frames that an analytics scheduler sends to a cloud node; `png` is lossless."""
-    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 90
     endpoint: EndpointConfig | None = None
     """Of the kind `http`."""
     settings: Settings = Field(default_factory=dict)

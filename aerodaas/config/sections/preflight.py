@@ -51,8 +51,6 @@ class PreflightConfig(Extensible):
     """Whether each camera that tells of its card has room on it."""
     cell_voltage: Positive = 3.5
     """Volts of a cell at least."""
-    cell_spread: Positive = 0.15
-    """Volts between the best and the worst cell at most."""
     battery_cycles: Annotated[int, Field(ge=1)] = 300
     """Charging cycles at most."""
     most_vibration: Positive = 15.0

@@ -56,6 +56,8 @@ def sun_elevation(latitude: float, longitude: float, clock: float) -> float:
 
 
 _NOT_KNOWN = "not known"
+_CELL_SPREAD = 0.15
+"""Volts between the best and the worst cell of a sound battery at most."""
 _SUBJECTS = {
     "GPS": "gps",
     "battery": "cells",
@@ -183,12 +185,12 @@ class Checklist:
         yield _camera(told.cameras or ())
 
     def _cells(self, cells: tuple[float, ...] | None) -> HealthItem:
-        least, spread = self._policy.cell_voltage, self._policy.cell_spread
-        bound = f"at least {least:.2f} V, at most {spread:.2f} V apart"
+        least = self._policy.cell_voltage
+        bound = f"at least {least:.2f} V, at most {_CELL_SPREAD:.2f} V apart"
         if not cells:
             return _unknown("cells", bound)
         apart = max(cells) - min(cells)
-        good = min(cells) >= least and apart <= spread
+        good = min(cells) >= least and apart <= _CELL_SPREAD
         value = f"{len(cells)} cells from {min(cells):.2f} V, {apart:.2f} V apart"
         return HealthItem("cells", value, bound, _verdict(good=good))
 

@@ -39,6 +39,8 @@ from aerodaas.recording.report.overlay import VISIBLE, label_colour, rgb
 
 __all__ = ["EncodedFrame"]
 
+_H264_QUALITY = 23
+"""x264's constant rate factor: 18 looks like the original, 28 takes half of 23's space."""
 _BLACK = Color(r=0.0, g=0.0, b=0.0, a=0.7)
 
 
@@ -127,7 +129,7 @@ def _depth(depth: NDArray[np.uint16], header: Header, stream: str, session: Sess
 def _video(item: Frame, stream: str, session: Session) -> Entry:
     encoder = session.videos.get(stream)
     if encoder is None or encoder.size != (item.width, item.height):
-        encoder = H264Encoder(item.width, item.height, session.config.h264_quality)
+        encoder = H264Encoder(item.width, item.height, _H264_QUALITY)
         session.videos[stream] = encoder
     stamp = item.header.stamp
     video = CompressedVideo(

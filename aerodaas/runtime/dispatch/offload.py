@@ -111,7 +111,7 @@ def _codec(resource: ComputeConfig) -> Codec:
     # An endpoint's client is on the edge; the endpoint's protocol has its own encoding.
     if resource.kind == "http":
         return Codec("none")
-    return Codec(resource.compression, resource.jpeg_quality)
+    return Codec(resource.compression)
 
 
 def _work(node: Node, resource: ComputeConfig) -> Analytics[Any]:
