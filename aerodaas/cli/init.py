@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -66,10 +65,6 @@ def init(
             "Tello at 192.168.10.1. Nothing moves.",
         ),
     ] = None,
-    address: Annotated[
-        str | None,
-        typer.Option(help="Also ask this Ray cluster (`host:port`) which nodes it has."),
-    ] = None,
     seconds: Annotated[
         float, typer.Option(min=0.1, max=60, help="How long --discover listens.")
     ] = 3.0,
@@ -99,7 +94,7 @@ def init(
         beginning = _asked()
     else:
         beginning = EnvironmentChoices(vehicle, url, cameras=camera)
-    _write(beginning, _compute(address), output, force=force)
+    _write(beginning, output, force=force)
 
 
 def _choices() -> str:
@@ -180,32 +175,11 @@ def _discovered(
     )
 
 
-def _compute(address: str | None) -> list[dict[str, str]] | None:
-    """The resources of a cluster, as the environment file lists them."""
-    if address is None:
-        return None
-    from aerodaas.actors.cluster import ray_cluster as cluster  # noqa: PLC0415 - loads ray
-
-    try:
-        cluster.connect(address)
-        return [{"id": one.id, "kind": one.kind} for one in cluster.discover()]
-    finally:
-        cluster.disconnect()
-
-
-def _write(
-    beginning: EnvironmentChoices,
-    compute: list[dict[str, str]] | None,
-    output: Path,
-    *,
-    force: bool,
-) -> None:
+def _write(beginning: EnvironmentChoices, output: Path, *, force: bool) -> None:
     from aerodaas.config.model import validated  # noqa: PLC0415 - slow to load
     from aerodaas.config.schema import environment_schema  # noqa: PLC0415 - slow to load
     from aerodaas.runtime.checks import check_environment  # noqa: PLC0415 - slow to load
 
-    if compute is not None:
-        beginning = replace(beginning, compute=compute)
     document = beginning.document(_SCHEMA, output.parent)
     check_environment(validated(document, str(output)), str(output))
     schema = output.parent / _SCHEMA

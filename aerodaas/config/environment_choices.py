@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os.path
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +64,6 @@ class EnvironmentChoices:
     cameras: Sequence[str] | None = None
     """The vehicle's own by its name, a device, a URL, a file or a folder; `none` is none. None:
     those that the vehicle brings along."""
-    compute: Sequence[dict[str, str]] = field(default=({"id": "edge", "kind": "edge"},))
 
     def document(self, schema: str, folder: Path) -> dict[str, Any]:
         """The content of an environment file.
@@ -106,7 +105,7 @@ class EnvironmentChoices:
             "$schema": schema,
             "name": self.vehicle,
             "robots": [robot],
-            "compute": list(self.compute),
+            "compute": [{"id": "edge", "kind": "edge"}],
             "schedulers": {"trajectory": "nearest_neighbor"},
             **({"simulation": world} if self.vehicle == "simulated" else {}),
         }
