@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from command_line import exit_code
 
-from aerodaas.cli.app import main
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.runtime.checks import check_environment
 
@@ -27,12 +27,10 @@ def init_command(
     monkeypatch.chdir(tmp_path)
 
     def run(*words: str, answers: str = "", command: str = "init") -> tuple[int, str]:
-        monkeypatch.setattr("sys.argv", ["aerodaas", command, *words])
         monkeypatch.setattr("sys.stdin", io.StringIO(answers))
-        with pytest.raises(SystemExit) as ended:
-            main()
+        code = exit_code(command, *words)
         told = capsys.readouterr()
-        return int(ended.value.code or 0), told.out + told.err
+        return code, told.out + told.err
 
     return run
 

@@ -16,9 +16,9 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from command_line import exit_code
 from flying import FLAT, robot
 
-from aerodaas.cli.app import main
 from aerodaas.cli.doctor import examine
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
@@ -64,15 +64,12 @@ class Commands:
 
     def __call__(self, *words: str) -> Ended:
         """Run `aerodaas` with these words."""
-        sys.argv = ["aerodaas", *words]
         self._capture.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            main()
-        code = ended.value.code
+        code = exit_code(*words)
         captured = self._capture.readouterr()
         assert "Traceback" not in captured.err
         assert "Traceback" not in captured.out
-        return Ended(int(code or 0), captured.out, captured.err)
+        return Ended(code, captured.out, captured.err)
 
     def run(self, app: str, *words: str) -> Ended:
         """Write an application and run it, without the live view, into the folder `out`."""
@@ -509,7 +506,7 @@ def test_a_survey_loads_no_model_and_no_codec(tmp_path: Path) -> None:
 
 
 def test_compiling_says_what_no_document_can_hold(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One message and no file; what can be written goes into the file."""
     (tmp_path / "environment.json").write_text(json.dumps(CONTENT))
@@ -525,12 +522,9 @@ def test_compiling_says_what_no_document_can_hold(
     ):
         application.write_text(text)
         output = folder / wanted.name
-        words = ["aerodaas", "compile", str(application), "-o", str(output)]
-        monkeypatch.setattr(sys, "argv", words)
-        with pytest.raises(SystemExit) as ended:
-            main()
+        found = exit_code("compile", str(application), "-o", str(output))
         said = capsys.readouterr().err
-        assert (ended.value.code or 0) == code, said
+        assert found == code, said
         assert said.count("error:") == (code != 0)
         assert output.exists() == (code == 0)
     assert json.loads(wanted.read_text())["analyses"][0]["id"] == "drone/monitoring"

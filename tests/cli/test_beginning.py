@@ -8,8 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from command_line import exit_code
 
-from aerodaas.cli.app import main
 from aerodaas.cli.shipped import TEMPLATES, find_application, purpose, shipped_applications
 from aerodaas.environment.document.flying import compile_application
 from aerodaas.errors import ConfigError, MissionError
@@ -29,11 +29,9 @@ def aerodaas(
     monkeypatch.setattr(sys, "path", list(sys.path))
 
     def run(*words: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["aerodaas", *words])
-        with pytest.raises(SystemExit) as ended:
-            main()
+        code = exit_code(*words)
         told = capsys.readouterr()
-        return int(ended.value.code or 0), told.out, told.err
+        return code, told.out, told.err
 
     return run
 

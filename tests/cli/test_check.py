@@ -7,10 +7,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from command_line import exit_code
 from flying import FLAT, robot
 
 from aerodaas.cli import doctor
-from aerodaas.cli.app import main
 from aerodaas.cli.flying import check
 
 PARTS = """
@@ -115,12 +115,10 @@ class Checked:
         (self._folder / "app.py").write_text(text)
         (self._folder / "check_parts.py").write_text(PARTS)
         sys.modules.pop("check_parts", None)
-        self._patch.setattr(sys, "argv", ["aerodaas", "check", "app.py", *words])
         self._patch.setattr(sys, "path", list(sys.path))
-        with pytest.raises(SystemExit) as ended:
-            main()
+        code = exit_code("check", "app.py", *words)
         told = self._capture.readouterr()
-        return int(ended.value.code or 0), " ".join((told.out + told.err).split())
+        return code, " ".join((told.out + told.err).split())
 
 
 @pytest.fixture

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
+from command_line import exit_code
 from flying import FLAT, robot
-
-from aerodaas.cli.app import main
 
 FAILED, WRONG = 1, 2
 HOP = """
@@ -20,18 +18,10 @@ drone = env.get_robot_by_id("drone")
 FENCE = {"geofence": {"polygon": [[-10, -10], [10, -10], [10, 10], [-10, 10]]}}
 
 
-def _code(*words: str) -> int:
-    sys.argv = ["aerodaas", *words]
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0)
-
-
 @pytest.fixture(autouse=True)
 def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("AERODAAS_TOKEN", "any")
-    monkeypatch.setattr(sys, "argv", sys.argv)
     Path("environment.json").write_text(json.dumps({**FLAT, "robots": [robot(limits=FENCE)]}))
     Path("broken.mcap").write_text("no recording")
 
@@ -59,7 +49,7 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_a_missing_or_broken_file_is_wrong_input(words: list[str]) -> None:
     """Whatever kind of file, and whichever command reads it."""
-    assert _code(*words) == WRONG
+    assert exit_code(*words) == WRONG
 
 
 @pytest.mark.parametrize(
@@ -79,7 +69,7 @@ def test_a_missing_or_broken_file_is_wrong_input(words: list[str]) -> None:
 def test_an_application_that_cannot_work_is_wrong_input(command: str, text: str, code: int) -> None:
     """What it raises while it works is a failure; its own code is its own."""
     Path("app.py").write_text(text)
-    assert _code(*command.split(), "app.py") == code
+    assert exit_code(*command.split(), "app.py") == code
 
 
 @pytest.mark.parametrize(
@@ -96,7 +86,7 @@ def test_a_plan_that_cannot_be_flown_is_wrong_input(command: str, waypoint: str)
     Path("app.py").write_text(
         f"{HOP}drone.navigate(AeroListData([{waypoint}]))\ndrone.start_mission()\n"
     )
-    assert _code(command, "app.py") == WRONG
+    assert exit_code(command, "app.py") == WRONG
     assert not Path("runs").exists()
 
 
@@ -111,4 +101,4 @@ def test_a_plan_that_cannot_be_flown_is_wrong_input(command: str, waypoint: str)
 )
 def test_what_does_not_answer_has_failed(words: list[str]) -> None:
     """The words were right."""
-    assert _code(*words) == FAILED
+    assert exit_code(*words) == FAILED

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import socket
-import sys
 import time
 from pathlib import Path
 from typing import Any, Literal
 
 import pytest
+from command_line import exit_code
 
-from aerodaas.cli.app import main
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.loading import load_vehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
@@ -53,14 +52,6 @@ def file_of(settings: dict[str, Any]) -> EnvironmentConfig:
     return EnvironmentConfig.model_validate(content)
 
 
-def look(monkeypatch: pytest.MonkeyPatch, command: str) -> int:
-    """Run a command; its exit code."""
-    monkeypatch.setattr(sys, "argv", ["aerodaas", *COMMANDS[command]])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0)
-
-
 @pytest.fixture(autouse=True)
 def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -70,9 +61,7 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("family", ["ardupilot", "px4"])
-def test_looking_changes_nothing(
-    monkeypatch: pytest.MonkeyPatch, family: Literal["px4", "ardupilot"], command: str
-) -> None:
+def test_looking_changes_nothing(family: Literal["px4", "ardupilot"], command: str) -> None:
     """No parameter, no plan, no mode; and no heartbeat of a ground station that then falls silent.
 
     A vehicle waits for the heartbeats of its ground station (ArduPilot: of one system id), and
@@ -83,7 +72,7 @@ def test_looking_changes_nothing(
     with EmulatedAutopilot(options) as autopilot:
         before = dict(autopilot.firmware.parameters.values)
         file_of({"url": f"udpin:{LOOPBACK}:{port}", **SETTING})
-        assert look(monkeypatch, command) == 0
+        assert exit_code(*COMMANDS[command]) == 0
         heard = [message for _, message in autopilot.heard]
         assert autopilot.firmware.parameters.values == before
         assert not any(autopilot.firmware.plans.plans.values())

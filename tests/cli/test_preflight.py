@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import socket
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+from command_line import exit_code
 
-from aerodaas.cli.app import main
 from tools.tello_vehicle import EmulatedTello
 
 DRONE: dict[str, Any] = {"id": "drone"}
@@ -19,13 +18,8 @@ DRONE: dict[str, Any] = {"id": "drone"}
 class Looked:
     """Runs `aerodaas check --robot` in a folder of its own."""
 
-    def __init__(
-        self,
-        folder: Path,
-        monkeypatch: pytest.MonkeyPatch,
-        capture: pytest.CaptureFixture[str],
-    ) -> None:
-        self._folder, self._patch, self._capture = folder, monkeypatch, capture
+    def __init__(self, folder: Path, capture: pytest.CaptureFixture[str]) -> None:
+        self._folder, self._capture = folder, capture
 
     def __call__(
         self,
@@ -36,13 +30,9 @@ class Looked:
         """Exit code and output."""
         content = {"robots": [robot], **environment}
         (self._folder / "environment.json").write_text(json.dumps(content))
-        self._patch.setattr(
-            sys, "argv", ["aerodaas", "check", "environment.json", "--robot", *words]
-        )
-        with pytest.raises(SystemExit) as ended:
-            main()
+        code = exit_code("check", "environment.json", "--robot", *words)
         told = self._capture.readouterr()
-        return int(ended.value.code or 0), told.out + told.err
+        return code, told.out + told.err
 
 
 @pytest.fixture
@@ -52,7 +42,7 @@ def look(
     """The command, on a wide terminal."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
-    return Looked(tmp_path, monkeypatch, capsys)
+    return Looked(tmp_path, capsys)
 
 
 def rows(told: str) -> dict[str, dict[str, str]]:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from command_line import exit_code
 from provider_stub import MISSION, TOKEN, Stub, mission
 
-from aerodaas.cli.app import main
 from aerodaas.environment.provider import exchange
 from aerodaas.environment.provider.logins import Logins
 from aerodaas.errors import AeroDaaSError
@@ -54,13 +54,11 @@ def aerodaas(
     (tmp_path / "app.py").write_text(APP)
 
     def run(*words: str) -> Ended:
-        monkeypatch.setattr(sys, "argv", ["aerodaas", *words])
         capsys.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            main()
+        code = exit_code(*words)
         captured = capsys.readouterr()
         assert "Traceback" not in captured.err
-        return Ended(int(ended.value.code or 0), captured.out, captured.err)
+        return Ended(code, captured.out, captured.err)
 
     return run
 

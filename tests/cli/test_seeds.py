@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
+from command_line import exit_code
 from flying import FLAT, Flyer, hop, recorded
 
-from aerodaas.cli.app import main
 from aerodaas.cli.flying.seeds.figures import rows
 from aerodaas.cli.flying.seeds.runs import SeededRun
 from aerodaas.recording.reader import Recording
@@ -48,10 +48,7 @@ drone.start_mission()
 def run(folder: Path, *words: str) -> int:
     """`aerodaas run --seeds`; returns the exit code."""
     seeds = ["--seeds", "3", "--seed", "3", "--record", str(folder / "out")]
-    sys.argv = ["aerodaas", "run", str(folder / "app.py"), *seeds, *words]
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0)
+    return exit_code("run", str(folder / "app.py"), *seeds, *words)
 
 
 def test_each_run_is_that_of_its_seed_alone(
@@ -135,10 +132,7 @@ def test_what_does_not_go_together(
 ) -> None:
     """Options of one flight alone, or of several alone, are refused with the remedy."""
     (tmp_path / "app.py").write_text("")
-    sys.argv = ["aerodaas", "run", str(tmp_path / "app.py"), *words]
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2
+    assert exit_code("run", str(tmp_path / "app.py"), *words) == 2
     assert told in capsys.readouterr().err
 
 

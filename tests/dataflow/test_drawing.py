@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
+from command_line import exit_code
 
 from aerodaas import Environment, MonitoringAnalytics
-from aerodaas.cli.app import main
 from aerodaas.cli.flying.application import build_application
 from aerodaas.config.options import RunOptions
 from aerodaas.dataflow import graph as module
@@ -41,15 +40,10 @@ def env(monkeypatch: pytest.MonkeyPatch) -> Environment:
     return Environment("environments/farm.json")
 
 
-def test_search_and_rescue_is_drawn(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_search_and_rescue_is_drawn(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """Sensors, analyses where they run, streams, a trigger, waypoints; printed or in a file."""
     for words in (["search_and_rescue"], ["search_and_rescue", "-o", str(tmp_path / "a.mmd")]):
-        monkeypatch.setattr(sys, "argv", ["aerodaas", "compile", "--graph", *words])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        assert not ended.value.code
+        assert exit_code("compile", "--graph", *words) == 0
     assert capsys.readouterr().out == RESCUE
     assert (tmp_path / "a.mmd").read_text() == RESCUE
 

@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from command_line import exit_code
 from flying import FLAT, robot
 
-from aerodaas.cli.app import main
 from aerodaas.environment.document.flying import compile_application
 from aerodaas.errors import GraphError
 
@@ -64,11 +64,9 @@ def built(
     )
     Path("app.py").write_text(APPLICATION.format(hooks=hooks, start=start))
     Path("marks").write_text("")
-    monkeypatch.setattr(sys, "argv", ["aerodaas", *command.split(), "app.py", *COMMANDS[command]])
     monkeypatch.setattr(sys, "path", list(sys.path))
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0), Path("marks").read_text().split()
+    code = exit_code(*command.split(), "app.py", *COMMANDS[command])
+    return code, Path("marks").read_text().split()
 
 
 @pytest.fixture(autouse=True)
