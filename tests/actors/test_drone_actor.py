@@ -84,22 +84,6 @@ def test_reading_never_meets_a_mission_that_changes() -> None:
     _land(actor)
 
 
-def test_commands_after_the_end_are_refused_at_once() -> None:
-    """The loop turns no more, and the answer says how the mission ended."""
-    actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=20.0)
-    actor.start(host_time_ns())
-    _until_over(actor)
-    before = actor.robots()["drone"]
-    assert before.mission.state is MissionState.LANDED
-    began = time.monotonic()
-    answer = actor.command("drone", End())
-    assert time.monotonic() - began < 1.0
-    assert not answer.accepted
-    assert answer.text == "the mission is over: landed"
-    actor.stop()
-    assert actor.robots()["drone"] == before
-
-
 def test_what_is_told_while_connecting_has_the_missions_time() -> None:
     """Mission time stands at zero before the start, however long that takes."""
     actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=20.0)

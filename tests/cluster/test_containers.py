@@ -44,18 +44,6 @@ def test_the_first_process_is_an_init_and_nobody_is_root() -> None:
     assert f"--uid {user.words} " in IMAGE.of("RUN")[-1].words
 
 
-def test_bases_are_pinned_by_tag() -> None:
-    """All of them, in comments and pages too; `latest` is none."""
-    pages = [ROOT / "Containerfile", ROOT / "docs" / "containers.md"]
-    named = [word for page in pages for word in re.findall(r"BASE=(\S+)", page.read_text())]
-    assert len(named) > 3
-    for base in named:
-        _, colon, tag = base.rpartition(":")
-        assert colon, base
-        assert re.match(r"r?\d+\.\d+", tag), base
-    assert {stage.base for stage in STAGES} == {ARGUMENTS["BASE"]}
-
-
 def test_no_secret_gets_into_a_layer() -> None:
     """Neither by an argument or a variable, nor with the files that are copied."""
     for stage in STAGES:
@@ -95,13 +83,6 @@ def test_its_constraints_are_the_locked_versions() -> None:
     assert [one.partition(" ")[0] for one in made.splitlines()] == locked
     assert len(locked) > 100
     assert "hash" not in made
-
-
-def test_extras_exist() -> None:
-    """Those that are installed."""
-    (extras,) = (one.words for one in IMAGE.of("ARG") if one.words.startswith("EXTRAS="))
-    listed = re.findall(r"^(\w+) = \[", (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
-    assert set(extras.removeprefix("EXTRAS=").split(",")) <= set(listed)
 
 
 def test_the_service_is_started_by_words_that_it_takes(tmp_path: Path) -> None:
@@ -240,10 +221,3 @@ def test_a_head_is_joined_by_its_name(tmp_path: Path) -> None:
         [*words, "nowhere.invalid:6379"], env=variables, capture_output=True, text=True, check=False
     )
     assert "no way leads to nowhere.invalid:6379" in done.stderr
-
-
-@pytest.mark.parametrize("script", ["edge-head.sh", "edge-join.sh"])
-def test_scripts_are_valid_shell(script: str) -> None:
-    """As far as a shell that reads them without running them can tell."""
-    subprocess.run(["bash", "-n", str(ROOT / "clusters" / script)], check=True)  # noqa: S607
-    assert (ROOT / "clusters" / script).stat().st_mode & 0o111
