@@ -122,6 +122,7 @@ class Provider:
         *,
         drone: dict[str, Any] | None = None,
         compute: list[dict[str, Any]] | None = None,
+        watched: bool = True,
         **settings: Any,  # noqa: ANN401
     ) -> None:
         path = folder / "fleet.json"
@@ -133,11 +134,18 @@ class Provider:
         self.started: list[Any] = []
         monkeypatch.setattr(missions, "start_process", self._start)
         config = EnvironmentConfig.load(path)
-        self.settings = ServiceSettings(path, config, folder / "s", rehearse=False, **settings)
+        settings = {"rehearse": False, **settings}
+        self.settings = ServiceSettings(path, config, folder / "s", **settings)
         self.settings.state.mkdir()
         self.store = Store.open(folder / "service.db")
         self.store.tenants.add(Tenant("farm"))
         self.store.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(Scope), 0.0))
+        self._watched = watched
+        self.open()
+
+    def open(self) -> None:
+        """Open the service, as a service does when it starts."""
+        config = self.settings.config
         self.registry = FleetRegistry(config, self.store)
         self.leases = LeaseService(config, self.store, self.registry, Quotas(self.store))
         self.monitor = Monitor(self.registry)
@@ -147,7 +155,7 @@ class Provider:
             leases=self.leases,
             registry=self.registry,
             models=ModelStore(self.settings.models),
-            monitor=cast("FleetMonitor", self.monitor),
+            monitor=cast("FleetMonitor", self.monitor) if self._watched else None,
         )
         self.fleet = FleetView(
             config,
@@ -160,8 +168,10 @@ class Provider:
         )
 
     def _start(self, folder: Any, *, tied: bool, vehicles: bool) -> Any:  # noqa: ANN401
-        senses_only = FlightOrder.read(folder.order).attached is not None
-        assert (tied, vehicles) == (False, not senses_only), "who flies gets the vehicles' secrets"
+        order = FlightOrder.read(folder.order)
+        assert tied is order.rehearsal, "a flight outlives the service, no rehearsal does"
+        flies = not order.rehearsal and order.attached is None
+        assert vehicles is flies, "who flies gets the vehicles' secrets"
         self.started.append(folder)
 
         class Process:
@@ -170,10 +180,16 @@ class Provider:
 
         return Process()
 
-    def submit(self, name: str = "one") -> MissionOut:
+    def close(self) -> None:
+        """Leave flights to themselves: the stand-in of a rehearsal has no id to be killed by."""
+        if not self.settings.rehearse:
+            self.missions.close()
+        self.store.close()
+
+    def submit(self, name: str = "one", key: str | None = None, **more: object) -> MissionOut:
         """Submit a mission for one drone."""
-        content = {"document": document(name, (5, 0))}
-        return self.missions.submit(PILOT, MissionIn.model_validate(content))
+        content = {"document": document(name, (5, 0)), **more}
+        return self.missions.submit(PILOT, MissionIn.model_validate(content), key)
 
     def flying(self, **more: object) -> MissionOut:
         """Submit a mission for drone `one`, and have it fly."""

@@ -33,8 +33,7 @@ def provider(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Provid
     made.store.tenants.add(Tenant("city"))
     made.store.accounts.add(Account("bela", "city", Role.PILOT, CITY.scopes, 0.0))
     yield made
-    made.missions.close()
-    made.store.close()
+    made.close()
 
 
 def watching(host: str, **changes: object) -> MissionIn:
@@ -116,8 +115,7 @@ def test_without_the_providers_consent_nothing_is_attached(
         with pytest.raises(RefusedError, match="shares no cameras between applications"):
             provider.missions.submit(who, watching(host.id))
     assert provider.fleet.seen_by(CITY).robots[0].shared == []
-    provider.missions.close()
-    provider.store.close()
+    provider.close()
 
 
 @pytest.mark.parametrize(

@@ -29,8 +29,7 @@ def provider(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Provid
     """A provider whose monitor is the test's."""
     made = Provider(tmp_path, monkeypatch)
     yield made
-    made.missions.close()
-    made.store.close()
+    made.close()
 
 
 def test_a_flight_begins_once_the_monitor_has_let_go(provider: Provider) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -11,115 +10,43 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from offered import PILOT, Provider
 from pydantic import ValidationError
-from served import document, fleet, robot
+from served import document
 
-from aerodaas.config.model import EnvironmentConfig, SimulationConfig
+from aerodaas.config.model import SimulationConfig
 from aerodaas.errors import MissionError
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     LeaseIn,
     MissionIn,
-    MissionOut,
     MissionPhase,
     Role,
     Scope,
     VerdictOut,
 )
 from aerodaas.service import mission as missions
-from aerodaas.service.access.principal import Principal
-from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.errors import RefusedError, StoreError
-from aerodaas.service.fleet.fleet_registry import FleetRegistry
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.orders import Outcome
-from aerodaas.service.leases.lease_service import LeaseService
-from aerodaas.service.mission_service import MissionService
 from aerodaas.service.models import model_store as models
-from aerodaas.service.models.model_store import ModelStore
-from aerodaas.service.settings import ServiceSettings
-from aerodaas.service.store import Account, Store, Tenant
-
-PILOT = Principal("pilot", "farm", Role.PILOT, frozenset(Scope), "t")
+from aerodaas.service.store import Account, Tenant
 
 
-class Process:
-    """A process that a test ends, in the place of a flight's."""
-
-    def __init__(self) -> None:
-        self.ended: int | None = None
-
-    def poll(self) -> int | None:
-        """Its exit code; None while it runs."""
-        return self.ended
-
-
-class MissionsAlone:
-    """A service over a fleet of two, whose processes never run."""
-
-    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, **settings: Any) -> None:  # noqa: ANN401
-        path = folder / "fleet.json"
-        path.write_text(json.dumps(fleet(robot("one"), robot("two", 10))), encoding="utf-8")
-        self.started: list[Path] = []
-        self.processes: list[Process] = []
-        monkeypatch.setattr(missions, "start_process", self._start)
-        config = EnvironmentConfig.load(path)
-        self.settings = ServiceSettings(path, config, folder / "s", **settings)
-        self.settings.state.mkdir()
-        self.store = Store.open(folder / "service.db")
-        self.store.tenants.add(Tenant("farm"))
-        self.store.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(Scope), 0.0))
-        self.open()
-
-    def _start(self, folder: Any, *, tied: bool, vehicles: bool) -> Process:  # noqa: ANN401 - FlightFolder
-        assert vehicles is not tied, "a rehearsal is connected with no vehicle"
-        assert tied == (folder.path.name == "r"), "a flight outlives the service, no rehearsal does"
-        self.started.append(folder.path)
-        self.processes.append(Process())
-        return self.processes[-1]
-
-    def open(self) -> None:
-        """Open the service, as a service does when it starts."""
-        quotas, registry = Quotas(self.store), FleetRegistry(self.settings.config, self.store)
-        self.leases = LeaseService(self.settings.config, self.store, registry, quotas)
-        self.missions = MissionService(
-            self.settings,
-            self.store,
-            leases=self.leases,
-            registry=registry,
-            models=ModelStore(self.settings.models),
-        )
-
-    def close(self) -> None:
-        """Leave flights to themselves: the stand-in of a rehearsal has no id to be killed by."""
-        if not self.settings.rehearse:
-            self.missions.close()
-        self.store.close()
-
-    def submit(self, robot: str, key: str | None = None, **more: object) -> MissionOut:
-        """Submit a mission for one drone."""
-        content = {"document": document(robot, (5, 0)), **more}
-        return self.missions.submit(PILOT, MissionIn.model_validate(content), key)
-
-    def phase(self, mission: MissionOut) -> MissionPhase:
-        """Present phase of a mission."""
-        return self.missions.shown(mission.id).phase
-
-    def turns(self, count: int = 4) -> None:
-        """Let the service move on."""
-        for _ in range(count):
-            self.missions.advance()
+def unwatched(folder: Path, monkeypatch: pytest.MonkeyPatch, **settings: Any) -> Provider:  # noqa: ANN401
+    """A service over a fleet of two without a monitor, whose processes never run."""
+    return Provider(folder, monkeypatch, watched=False, **settings)
 
 
 @pytest.fixture
-def one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[MissionsAlone]:
+def one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Provider]:
     """A service that rehearses nothing."""
-    made = MissionsAlone(tmp_path, monkeypatch, rehearse=False)
+    made = unwatched(tmp_path, monkeypatch, rehearse=False)
     yield made
     made.close()
 
 
-def test_what_one_mission_meets_is_its_own(one: MissionsAlone) -> None:
+def test_what_one_mission_meets_is_its_own(one: Provider) -> None:
     """A lease that cannot be had refuses that mission, with the reason; the next one flies."""
     stuck = one.submit("one")
     one.turns(1)
@@ -140,7 +67,7 @@ def _out(name: str) -> Any:  # noqa: ANN401 - a row
 
 def test_a_rehearsal_has_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that does not end is refused, and not waited for."""
-    made = MissionsAlone(tmp_path, monkeypatch, rehearse=True, rehearsal_seconds=60.0)
+    made = unwatched(tmp_path, monkeypatch, rehearse=True, rehearsal_seconds=60.0)
     ended: list[bool] = []
     monkeypatch.setattr(
         missions.ActiveMission, "end_rehearsal", lambda _: ended.append(True), raising=True
@@ -161,7 +88,7 @@ def test_a_rehearsal_has_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_rehearsals_take_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As many at once as the provider has cores; nobody waits for all that others have sent."""
-    made = MissionsAlone(tmp_path, monkeypatch, rehearse=True, most_rehearsals=1, most_flights=0)
+    made = unwatched(tmp_path, monkeypatch, rehearse=True, most_rehearsals=1, most_flights=0)
     made.store.tenants.add(Tenant("city"))
     made.store.accounts.add(Account("warden", "city", Role.PILOT, frozenset(Scope), 0.0))
     farm = [made.submit("one") for _ in range(3)]
@@ -176,11 +103,10 @@ def test_rehearsals_take_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert "number 1 " in made.missions.shown(city.id).reason
     approved = Outcome(landed=True, began=0.0, ended=1.0, verdict=VerdictOut(approved=True))
     for count, begun in enumerate((city, farm[1], farm[2]), 1):
-        FlightFolder(made.started[-1]).end(approved)
-        made.processes[-1].ended = 0
+        made.started[-1].end(approved)
         made.turns(2)
         assert len(made.started) == count + 1
-        assert made.started[-1].parent.name == begun.id
+        assert made.started[-1].path.parent.name == begun.id
     made.close()
 
 
@@ -188,7 +114,7 @@ def test_rehearsals_of_a_former_service_take_turns(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """However many it had under way."""
-    made = MissionsAlone(tmp_path, monkeypatch, rehearse=True, most_rehearsals=3)
+    made = unwatched(tmp_path, monkeypatch, rehearse=True, most_rehearsals=3)
     for _ in range(3):
         made.submit("one")
     made.turns()
@@ -200,7 +126,7 @@ def test_rehearsals_of_a_former_service_take_turns(
     made.close()
 
 
-def test_a_full_disk_takes_no_missions(one: MissionsAlone, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_takes_no_missions(one: Provider, monkeypatch: pytest.MonkeyPatch) -> None:
     """The flying ones need the room that is left."""
     monkeypatch.setattr(models, "_LEAST_FREE", 1 << 60)
     with pytest.raises(RefusedError, match="make room") as refused:
@@ -208,7 +134,7 @@ def test_a_full_disk_takes_no_missions(one: MissionsAlone, monkeypatch: pytest.M
     assert refused.value.status == 507
 
 
-def test_one_key_is_one_mission_however_many_send_it_at_once(one: MissionsAlone) -> None:
+def test_one_key_is_one_mission_however_many_send_it_at_once(one: Provider) -> None:
     """Also while none of them is kept yet; what the others wrote is gone."""
     with ThreadPoolExecutor(8) as pool:
         ids = {found.id for found in pool.map(lambda _: one.submit("one", "k"), range(8))}
@@ -217,7 +143,7 @@ def test_one_key_is_one_mission_however_many_send_it_at_once(one: MissionsAlone)
     assert {path.name for path in one.settings.missions.iterdir()} == ids
 
 
-def test_what_has_used_up_its_quota_is_still_found_by_its_key(one: MissionsAlone) -> None:
+def test_what_has_used_up_its_quota_is_still_found_by_its_key(one: Provider) -> None:
     """The answer to a repeated submission does not depend on what happened since."""
     first = one.submit("one", "k")
     one.missions._registry.take_out_of_service(["one"])
@@ -226,7 +152,7 @@ def test_what_has_used_up_its_quota_is_still_found_by_its_key(one: MissionsAlone
         one.submit("one", "other")
 
 
-def test_missions_that_wait_together_fly_no_longer_than_the_quota(one: MissionsAlone) -> None:
+def test_missions_that_wait_together_fly_no_longer_than_the_quota(one: Provider) -> None:
     """Each alone was within it when it was submitted, and no lease counted yet."""
     one.store.tenants.put(Tenant("farm", flight_minutes=20.0))
     first, second = one.submit("one"), one.submit("two")
@@ -236,7 +162,7 @@ def test_missions_that_wait_together_fly_no_longer_than_the_quota(one: MissionsA
     assert "leaves 5.0 flight minutes" in one.missions.shown(second.id).reason
 
 
-def test_a_lease_counts_once_for_the_quota(one: MissionsAlone) -> None:
+def test_a_lease_counts_once_for_the_quota(one: Provider) -> None:
     """Its mission needs no further minutes."""
     one.store.tenants.put(Tenant("farm", flight_minutes=20.0))
     lease = one.leases.request(PILOT, LeaseIn(robots=["one"], minutes=15.0))
@@ -276,11 +202,11 @@ def test_what_no_file_can_hold_is_refused_before_one_is_made(
         MissionIn.model_validate({"document": document("one", (5, 0), **changes)})
 
 
-def test_a_mission_is_taken_up_again_by_the_next_service(one: MissionsAlone) -> None:
+def test_a_mission_is_taken_up_again_by_the_next_service(one: Provider) -> None:
     """A flight that was ordered and has not begun is begun; one that has begun is not."""
     first, second = one.submit("one"), one.submit("two")
     one.turns()
-    flights = {path.parent.name: path for path in one.started}
+    flights = {folder.path.parent.name: folder.path for folder in one.started}
     assert set(flights) == {first.id, second.id}
     (flights[second.id] / "begun").touch()
     one.started.clear()
@@ -288,14 +214,14 @@ def test_a_mission_is_taken_up_again_by_the_next_service(one: MissionsAlone) -> 
     one.missions.close()
     one.open()
     one.turns(1)
-    assert one.started == [flights[first.id]]
+    assert [folder.path for folder in one.started] == [flights[first.id]]
 
 
 def test_a_rehearsal_that_ended_with_its_service_is_begun_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By the next one; one that has a result is judged by that, and not flown twice."""
-    made = MissionsAlone(tmp_path, monkeypatch, rehearse=True, most_rehearsals=2)
+    made = unwatched(tmp_path, monkeypatch, rehearse=True, most_rehearsals=2)
     lost, judged = made.submit("one"), made.submit("two")
     made.turns(1)
     assert len(made.started) == 2
@@ -306,7 +232,7 @@ def test_a_rehearsal_that_ended_with_its_service_is_begun_again(
     made.started.clear()
     made.open()
     made.turns(3)
-    assert made.started == [
+    assert [folder.path for folder in made.started] == [
         made.missions._missions[lost.id].rehearsal.path,
         made.missions._missions[judged.id].flight.path,
     ]
@@ -315,7 +241,7 @@ def test_a_rehearsal_that_ended_with_its_service_is_begun_again(
 
 
 def test_leases_end_while_the_database_is_gone(
-    one: MissionsAlone, monkeypatch: pytest.MonkeyPatch
+    one: Provider, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """And the service goes on when it is back."""
     mission = one.submit("one")
@@ -339,7 +265,7 @@ def test_leases_end_while_the_database_is_gone(
 
 
 def test_what_fails_each_turn_is_logged_once(
-    one: MissionsAlone, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    one: Provider, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """And again once it is something else; its end, too. A fault of ours has its traceback."""
     failures = iter([StoreError("no room"), StoreError("no room"), StoreError("gone")])
@@ -363,7 +289,7 @@ def test_what_fails_each_turn_is_logged_once(
 
 
 def test_so_is_a_flight_that_cannot_be_heard(
-    one: MissionsAlone, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    one: Provider, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """It flies on by itself."""
     mission = one.submit("one")
@@ -381,7 +307,7 @@ def _unreadable(*_: object) -> None:
     raise OSError("unreadable")
 
 
-def test_a_flight_is_followed_once(one: MissionsAlone, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_flight_is_followed_once(one: Provider, monkeypatch: pytest.MonkeyPatch) -> None:
     """However many ask for it first: each link more would look for its flight for ever."""
     made: list[object] = []
 
@@ -409,7 +335,7 @@ def test_trees_stand_where_the_missions_own_seed_has_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On the map of a mission that asked for one; the fleet's seed is for all others."""
-    served = MissionsAlone(tmp_path, monkeypatch)
+    served = unwatched(tmp_path, monkeypatch)
     wooded = served.settings.config.model_copy(
         update={"simulation": SimulationConfig(world="campus")}
     )
@@ -421,7 +347,7 @@ def test_trees_stand_where_the_missions_own_seed_has_them(
     assert served.missions.scenery(PILOT, other.id) == known
 
 
-def test_a_cancellation_during_launch_is_kept(one: MissionsAlone) -> None:
+def test_a_cancellation_during_launch_is_kept(one: Provider) -> None:
     """The flight's process does not listen yet: it finds it in its folder, whoever serves then."""
     mission = one.submit("one")
     one.turns()
@@ -432,11 +358,10 @@ def test_a_cancellation_during_launch_is_kept(one: MissionsAlone) -> None:
     one.open()
     one.turns(1)
     assert one.missions.shown(mission.id).reason == "cancelled by pilot"
-    flight = FlightFolder(one.started[-1])
+    flight = one.started[-1]
     assert flight.cancelled == "cancelled by pilot"
     aborted = "one: aborted: cancelled by pilot before take-off"
     flight.end(Outcome(landed=False, reason=aborted, began=0.0, ended=1.0))
-    one.processes[-1].ended = 0
     one.turns(1)
     assert one.phase(mission) is MissionPhase.CANCELLED
 
@@ -447,7 +372,7 @@ def test_a_mission_is_cancelled_once_in_each_phase(
 ) -> None:
     """The second time it is told as over, before and after the service has moved on."""
     early = {MissionPhase.SUBMITTED, MissionPhase.REHEARSING}
-    made = MissionsAlone(
+    made = unwatched(
         tmp_path,
         monkeypatch,
         rehearse=phase in early,
@@ -462,10 +387,7 @@ def test_a_mission_is_cancelled_once_in_each_phase(
     assert found.reason == "cancelled by pilot"
     if phase is MissionPhase.FLYING:
         assert made.missions.cancel(PILOT, mission.id).phase is phase
-        FlightFolder(made.started[-1]).end(
-            Outcome(landed=True, reason=found.reason, began=0.0, ended=1.0)
-        )
-        made.processes[-1].ended = 0
+        made.started[-1].end(Outcome(landed=True, reason=found.reason, began=0.0, ended=1.0))
         made.turns(1)
     assert made.phase(mission) is MissionPhase.CANCELLED
     for _ in range(2):
@@ -477,7 +399,7 @@ def test_a_mission_is_cancelled_once_in_each_phase(
 
 
 def test_a_cancellation_that_is_neither_kept_nor_heard_is_refused(
-    one: MissionsAlone, monkeypatch: pytest.MonkeyPatch
+    one: Provider, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On a full disk, of a flight that does not listen: nobody may believe that it comes home."""
     mission = one.submit("one")

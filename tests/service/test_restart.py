@@ -12,8 +12,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from offered import PILOT, Provider
 from served import document, fleet, robot
-from test_mission_service import PILOT, MissionsAlone
+from test_mission_service import unwatched
 
 from aerodaas.errors import MissionError
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, MissionOut, MissionPhase, Role, Scope
@@ -53,7 +54,7 @@ def held(locks: Path) -> Iterator[subprocess.Popen[str]]:
             process.kill()
 
 
-def crowded(served: MissionsAlone, phase: MissionPhase, **changes: object) -> None:
+def crowded(served: Provider, phase: MissionPhase, **changes: object) -> None:
     """Add thousands of newer missions of another tenant for drone `two`."""
     served.store.tenants.put(Tenant("crowd"))
     served.store.accounts.put(Account("crowd", "crowd", Role.PILOT, frozenset(Scope), 0.0))
@@ -64,7 +65,7 @@ def crowded(served: MissionsAlone, phase: MissionPhase, **changes: object) -> No
     served.store.missions.put(*rows)
 
 
-def reach(served: MissionsAlone, phase: MissionPhase) -> MissionOut:
+def reach(served: Provider, phase: MissionPhase) -> MissionOut:
     """A mission for drone `one` in a phase."""
     blocked = served.settings
     if phase is MissionPhase.QUEUED:
@@ -88,7 +89,7 @@ def test_a_restart_forgets_no_mission(
 ) -> None:
     """However many newer ones of others there are, over or not; it is found, and goes on."""
     rehearse = phase in {MissionPhase.SUBMITTED, MissionPhase.REHEARSING}
-    served = MissionsAlone(
+    served = unwatched(
         tmp_path,
         monkeypatch,
         rehearse=rehearse,
@@ -110,14 +111,16 @@ def test_a_restart_forgets_no_mission(
             lease = served.leases.request(CROWD, LeaseIn(robots=["one"]))
             served.turns()
             assert served.leases.lease(lease.id).state is LeaseState.QUEUED
-            assert len({path.parent.name for path in served.started}) == 1, "its own flight's alone"
+            assert len({one.path.parent.name for one in served.started}) == 1, (
+                "its own flight's alone"
+            )
 
 
 def test_missions_wait_in_the_order_of_their_submission(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also after a restart: the first of those that share a lease flies first."""
-    served = MissionsAlone(tmp_path, monkeypatch, rehearse=False, most_flights=0)
+    served = unwatched(tmp_path, monkeypatch, rehearse=False, most_flights=0)
     with closing(served):
         lease = served.leases.request(PILOT, LeaseIn(robots=["one"]))
         first, second = (served.submit("one", lease=lease.id) for _ in range(2))
@@ -133,7 +136,7 @@ def test_no_flight_begins_on_a_drone_that_a_living_process_flies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of which the database says nothing: no lease is granted, until that process is gone."""
-    served = MissionsAlone(tmp_path, monkeypatch, rehearse=False)
+    served = unwatched(tmp_path, monkeypatch, rehearse=False)
     with closing(served), held(served.settings.locks) as flight:
         mission, other = served.submit("one"), served.submit("two")
         served.turns()
@@ -152,7 +155,7 @@ def test_a_lease_that_is_held_already_starts_no_second_flight(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It waits, and says for what."""
-    served = MissionsAlone(tmp_path, monkeypatch, rehearse=False)
+    served = unwatched(tmp_path, monkeypatch, rehearse=False)
     with closing(served):
         lease = served.leases.request(PILOT, LeaseIn(robots=["one"]))
         with held(served.settings.locks):
@@ -181,7 +184,7 @@ def test_a_tenant_has_so_many_missions_that_are_not_over(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One more is refused until one is over; others' are not counted, and a repetition is none."""
-    served = MissionsAlone(tmp_path, monkeypatch, rehearse=False, most_open=2, approval=True)
+    served = unwatched(tmp_path, monkeypatch, rehearse=False, most_open=2, approval=True)
     with closing(served):
         first, _ = served.submit("one", "k1"), served.submit("one", "k2")
         with pytest.raises(RefusedError, match="cancel some") as refused:

@@ -38,8 +38,7 @@ def one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Provider]:
     may = {"farm": frozenset({"one/hook"}), "other": frozenset({"one/pump"})}
     made = Provider(tmp_path, monkeypatch, drone=CARRIED, actuators=may)
     yield made
-    made.missions.close()
-    made.store.close()
+    made.close()
 
 
 def moving(robot: str, **moves: str) -> MissionIn:

@@ -58,8 +58,7 @@ def provider(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Provid
     made.monitor.see("one")
     made.store.usage.put(Usage(mission.id, "farm", "pilot", time.time(), cloud_calls=3))
     yield made
-    made.missions.close()
-    made.store.close()
+    made.close()
 
 
 @pytest.mark.parametrize(
@@ -107,8 +106,7 @@ def test_the_recording_of_a_lost_flight_can_be_deleted(
     assert provider.missions.shown(mission.id).recording
     provider.missions.delete_recording(PILOT, mission.id)
     assert not provider.missions.shown(mission.id).recording
-    provider.missions.close()
-    provider.store.close()
+    provider.close()
 
 
 def test_a_flight_has_the_weight_of_its_tenant(
@@ -121,5 +119,4 @@ def test_a_flight_has_the_weight_of_its_tenant(
     edge = FlightOrder.read(provider.started[-1].order).edge
     assert edge is not None
     assert (edge.tenant, edge.weight) == ("farm", 3.0)
-    provider.missions.close()
-    provider.store.close()
+    provider.close()
