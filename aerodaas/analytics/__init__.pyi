@@ -5,8 +5,6 @@ from .conditions import Below as Below
 from .conditions import Near as Near
 from .detection.combined import CombinedDetector as CombinedDetector
 from .detection.detector import OnnxDetector as OnnxDetector
-from .detection.supervision_adapter import from_supervision as from_supervision
-from .detection.supervision_adapter import to_supervision as to_supervision
 from .detection.tracking import TrackingAnalytics as TrackingAnalytics
 from .detection.vip_detection import VipDetectionAnalytics as VipDetectionAnalytics
 from .follow.analytics import FollowAnalytics as FollowAnalytics

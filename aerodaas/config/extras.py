@@ -17,7 +17,6 @@ _PACKAGES = {
     "service": ("fastapi", "jwt", "sqlalchemy", "uvicorn", "websockets"),
     "ros": ("rosbags",),
     "routing": ("pyvrp",),
-    "supervision": ("supervision",),
     "terrain": ("tifffile", "imagecodecs"),
 }
 """Packages to import, by extra."""
@@ -32,8 +31,8 @@ def require_extra(extra: str, purpose: str) -> None:
     """Require the packages of an extra.
 
     Args:
-        extra: `evaluation`, `logs`, `notebook`, `plots`, `remote`, `ros`, `routing`, `service`,
-            `supervision` or `terrain`.
+        extra: `evaluation`, `logs`, `notebook`, `plots`, `remote`, `ros`, `routing`, `service`
+            or `terrain`.
         purpose: The feature, as the subject of the error's sentence, in the singular.
 
     Raises:

@@ -12,11 +12,6 @@ from aerodaas.analytics.detection.model_file import ModelFile
 __all__ = ["class_names", "recognise"]
 
 _log = logging.getLogger(__name__)
-_FLAT_ROW = 7
-_FLAT_REMEDY = (
-    "export it with its results for each picture apart: YOLO-NAS with "
-    "output_predictions_format=BATCH, YOLOv7 without --end2end"
-)
 
 
 def recognise(model: ModelFile, families: Sequence[ModelFamily]) -> Decoder:
@@ -36,9 +31,8 @@ def recognise(model: ModelFile, families: Sequence[ModelFamily]) -> Decoder:
     if decoder is None:
         shapes = ", ".join(str(list(output.shape)) for output in model.outputs)
         problem = f"gives {shapes}, the output of no detector that is known here"
-        flat = len(model.outputs) == 1 and model.outputs[0].shape[1:] == (_FLAT_ROW,)
         remedy = "choose a YOLO detector, or pass a ModelFamily of your own in families="
-        raise model.refusal(problem, _FLAT_REMEDY if flat else remedy)
+        raise model.refusal(problem, remedy)
     return decoder
 
 

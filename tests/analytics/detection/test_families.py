@@ -213,43 +213,15 @@ def test_a_list_that_is_sure_of_the_background_is_refused(tmp_path: Path) -> Non
         OnnxDetector(path)
 
 
-def test_yolo_nas_without_nms(tmp_path: Path) -> None:
-    """Corners and scores in outputs of their own; overlapping boxes of one class are suppressed."""
-    boxes = np.zeros((1, CELLS, 4), np.float32)
-    scores = np.zeros((1, CELLS, 2), np.float32)
-    boxes[0, :3] = [[22, 12, 42, 52], [23, 13, 43, 53], [2, 2, 9, 9]]
-    scores[0, :3] = [[0.1, 0.9], [0.1, 0.8], [0.7, 0]]
-    for outputs in ([boxes, scores], [scores, boxes]):
-        path = constant_model(tmp_path / "a.onnx", outputs, metadata={"names": NAMES})
-        assert [(item.label, item.box) for item in detect(path)] == [
-            ("person", (22, 12, 42, 52)),
-            ("vest", (2, 2, 9, 9)),
-        ]
-
-
-def test_nms_with_four_outputs_and_bytes_for_pixels(tmp_path: Path) -> None:
-    """YOLO-NAS' own export: what follows the count is padding, whatever it holds."""
-    outputs: list[NDArray[Any]] = [
-        np.array([[2]], np.int64),
-        np.array([[[22, 12, 42, 52], [2, 2, 9, 9], [1, 1, 60, 60]]], np.float32),
-        np.array([[0.9, 0.7, 0.8]], np.float32),
-        np.array([[1, 0, 1]], np.int64),
-    ]
+def test_an_input_of_bytes_is_not_scaled(tmp_path: Path) -> None:
+    """Of a model whose export has the preprocessing in it."""
     path = constant_model(
-        tmp_path / "a.onnx", outputs, element=TensorProto.UINT8, metadata={"names": NAMES}
+        tmp_path / "a.onnx",
+        [ultralytics_output()],
+        element=TensorProto.UINT8,
+        metadata={"names": NAMES},
     )
-    assert [(item.label, item.box) for item in detect(path)] == [
-        ("person", (22, 12, 42, 52)),
-        ("vest", (2, 2, 9, 9)),
-    ]
     detector = OnnxDetector(path)
     pixels = detector.preprocess([Frame(Header(0, 0, "cam"), np.full((32, 64, 3), 200, np.uint8))])
     assert pixels.dtype == np.uint8
-    assert set(np.unique(pixels)) == {114, 200}, "bytes are not scaled"
-
-
-def test_results_of_all_pictures_in_one_table_are_refused_with_the_remedy(tmp_path: Path) -> None:
-    """YOLO-NAS' flat format and YOLOv7's end-to-end export differ in the order of their columns."""
-    path = constant_model(tmp_path / "a.onnx", [np.zeros((3, 7), np.float32)])
-    with pytest.raises(ModelError, match="output_predictions_format=BATCH"):
-        OnnxDetector(path)
+    assert set(np.unique(pixels)) == {114, 200}

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from aerodaas.analytics.detection.families.base import ModelFamily
 from aerodaas.analytics.detection.families.end2end import end_to_end
-from aerodaas.analytics.detection.families.nms_outputs import nms_outputs
 from aerodaas.analytics.detection.families.rtdetr import rtdetr
 from aerodaas.analytics.detection.families.ultralytics import ultralytics
-from aerodaas.analytics.detection.families.yolo_nas import yolo_nas
 from aerodaas.analytics.detection.families.yolov5 import yolov5
 from aerodaas.analytics.detection.families.yolox import yolox
 
@@ -19,11 +17,9 @@ FAMILIES: tuple[ModelFamily, ...] = (
     ultralytics,
     rtdetr,
     end_to_end,
-    yolo_nas,
-    nms_outputs,
 )
 """All families; a file belongs to the first that takes it.
 
-RT-DETR, which is told by its numbers, stands before the end-to-end exports and YOLO-NAS, whose
-shapes its outputs can have.
+RT-DETR, which is told by its numbers, stands before the end-to-end exports, whose shapes
+its outputs can have.
 """
