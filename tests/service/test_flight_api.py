@@ -15,6 +15,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from flight_orders import order_in
 from served_flight import Drones, ServedFlight
 
 from aerodaas.analytics.wire_items import pack
@@ -30,7 +31,7 @@ from aerodaas.protocol.schemas import CommandIn, FlightLeaseIn, PictureForm
 from aerodaas.service.flights import link, server
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightLink
-from aerodaas.service.flights.orders import FlightOrder, HostFlight
+from aerodaas.service.flights.orders import HostFlight
 from aerodaas.service.flights.server import LeasedFlight, LeaseWatch, ProcessServer
 from aerodaas.service.flights.shared_camera import SharedCamera, attached_config
 from aerodaas.service.http.limits import LEASED_FLIGHT
@@ -94,16 +95,7 @@ class Flight:
 
     def __init__(self, path: Path) -> None:
         self.folder = FlightFolder(path)
-        order = FlightOrder(
-            mission="m",
-            lease="l",
-            fleet=path,
-            robots=["one"],
-            locks=path,
-            ends=time.time() + 60,
-            minutes=1,
-        )
-        self.lease = LeaseWatch(order, lambda _: None)
+        self.lease = LeaseWatch(order_in(path), lambda _: None)
         self.drones = Drones(EnvironmentConfig.model_validate(FLEET))
         self.served = ServedFlight(self.folder, self.drones, self.lease, Filming)
         self.flight = cast("Filming", self.served.flight)

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import psutil
 import pytest
+from flight_orders import order_in
 from served import Served, document, fleet, robot
 
 from aerodaas.service.flights.folder import FlightFolder, start_process
-from aerodaas.service.flights.orders import FlightOrder
 
 pytestmark = pytest.mark.slow
 
@@ -49,17 +49,8 @@ def rehearse(folder: Path, **bounds: float) -> tuple[FlightFolder, int]:
     """Run the process of a rehearsal to its end; returns its folder and exit code."""
     path = folder / "fleet.json"
     path.write_text(json.dumps(fleet(robot("one", endurance=3600))), encoding="utf-8")
-    order = FlightOrder(
-        mission="m",
-        lease="rehearsal",
-        fleet=path,
-        robots=["one"],
-        locks=folder / "locks",
-        ends=time.time() + 1800,
-        minutes=30,
-        speed="max",
-        rehearsal=True,
-        **bounds,  # type: ignore[arg-type]
+    order = order_in(
+        folder, ends=time.time() + 1800, minutes=30, speed="max", rehearsal=True, **bounds
     )
     made = FlightFolder(folder / "r")
     made.make(order, json.dumps(document("one", *FAR)))

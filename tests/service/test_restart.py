@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from flight_orders import order_in
 from offered import PILOT, Provider
 from served import document, fleet, robot
 from test_mission_service import unwatched
@@ -21,7 +22,6 @@ from aerodaas.protocol.schemas import LeaseIn, LeaseState, MissionOut, MissionPh
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.folder import FlightFolder, RobotLocks
-from aerodaas.service.flights.orders import FlightOrder
 from aerodaas.service.store import Account, Mission, Tenant
 
 pytestmark = pytest.mark.wall_clock
@@ -201,17 +201,11 @@ def ordered(folder: Path) -> FlightFolder:
     """The folder of a flight that is ordered for drone `one`."""
     path = folder / "fleet.json"
     path.write_text(json.dumps(fleet(robot("one"))), encoding="utf-8")
-    wanted = FlightOrder(
-        mission="m",
-        lease="l",
-        fleet=path,
-        robots=["one"],
-        locks=folder / "locks",
-        ends=time.time() + 600,
-        minutes=10,
-    )
     made = FlightFolder(folder / "f")
-    made.make(wanted, json.dumps(document("one", (5.0, 0.0))))
+    made.make(
+        order_in(folder, ends=time.time() + 600, minutes=10),
+        json.dumps(document("one", (5.0, 0.0))),
+    )
     return made
 
 

@@ -6,10 +6,10 @@ import os
 import stat
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from flight_orders import order_in
 
 from aerodaas.errors import ConfigError, MissionError
 from aerodaas.service.flights.folder import FlightFolder
@@ -25,25 +25,11 @@ with FlightFolder(Path(sys.argv[1])).claim():
 """
 
 
-def order(folder: Path) -> FlightOrder:
-    """An order for one drone."""
-    fleet = folder / "fleet.json"
-    return FlightOrder(
-        mission="m",
-        lease="l",
-        fleet=fleet,
-        robots=["one"],
-        locks=folder / "locks",
-        ends=time.time() + 60,
-        minutes=1,
-    )
-
-
 @pytest.fixture
 def folder(tmp_path: Path) -> FlightFolder:
     """A folder with an order."""
     made = FlightFolder(tmp_path / "f")
-    made.make(order(tmp_path), "{}")
+    made.make(order_in(tmp_path), "{}")
     return made
 
 

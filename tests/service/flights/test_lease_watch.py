@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from flight_orders import order_in
 
 from aerodaas.protocol.schemas import SilencePolicy
-from aerodaas.service.flights.orders import FlightOrder
 from aerodaas.service.flights.server import LeaseWatch
 
 pytestmark = pytest.mark.wall_clock
@@ -35,17 +35,8 @@ def watch(
     drones: Drones, ends: float, cancelled: Callable[[], str] = str, **changes: object
 ) -> LeaseWatch:
     """A watch over a lease that ends `ends` seconds from now."""
-    content = {
-        "mission": "m",
-        "lease": "l",
-        "fleet": Path("fleet.json"),
-        "robots": ["one"],
-        "locks": Path("locks"),
-        "ends": time.time() + ends,
-        "minutes": 1,
-        **changes,
-    }
-    return LeaseWatch(FlightOrder.model_validate(content), drones, cancelled)
+    order = order_in(Path(), ends=time.time() + ends, **changes)
+    return LeaseWatch(order, drones, cancelled)
 
 
 def test_the_end_of_a_lease_brings_the_drones_home() -> None:
