@@ -47,9 +47,7 @@ def main(
     model: Annotated[str, typer.Argument(help="An ONNX file, or a model's name.")],
     dataset: Annotated[
         Path,
-        typer.Argument(
-            help="Annotations: COCO's .json, YOLO's data.yaml or folder, or VOC's folder."
-        ),
+        typer.Argument(help="Annotations: COCO's .json, or YOLO's data.yaml or folder."),
     ],
     pictures: Annotated[
         Path | None, typer.Option(help="Folder of the pictures, where it is not beside.")
@@ -81,7 +79,7 @@ def main(
 
         python -m tools.evaluation yolox-nano instances_val2017.json --pictures val2017
         python -m tools.evaluation mine.onnx campus/data.yaml --worst mistakes --csv campus.csv
-        python -m tools.evaluation mine.onnx VOC2012 --rename human=person
+        python -m tools.evaluation mine.onnx campus/data.yaml --rename human=person
     """
     require_extra("evaluation", "the evaluation of models")
     from tools.evaluation.reading import read_dataset  # noqa: PLC0415 - imports the extra

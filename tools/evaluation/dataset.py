@@ -1,4 +1,4 @@
-"""Annotated pictures: boxes and labels, in whichever of three formats they were written.
+"""Annotated pictures: boxes and labels, of COCO's and YOLO's formats.
 
 Annotations are a stranger's data: sizes, counts and numbers have bounds, and pictures lie in the
 folder of the pictures alone, whatever path an annotation names.
@@ -54,7 +54,7 @@ class Thing:
     label: str
     box: Box
     ignored: bool = False
-    """Need not be found, and may be: COCO's crowds, VOC's difficult objects."""
+    """Need not be found, and may be: COCO's crowds."""
     area: float | None = None
     """Square pixels of its outline where that is annotated; otherwise the box's count."""
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from aerodaas.errors import ConfigError
 from tools.evaluation.coco_json import read_coco
 from tools.evaluation.dataset import Dataset
-from tools.evaluation.voc_xml import read_voc
 from tools.evaluation.yolo_text import read_yolo
 
 __all__ = ["read_dataset"]
@@ -16,7 +15,7 @@ _YAML = (".yaml", ".yml")
 
 
 def read_dataset(path: Path, pictures: Path | None = None) -> Dataset:
-    """Read annotations of COCO (a JSON), YOLO (`data.yaml`, or its folder) or VOC (a folder).
+    """Read annotations of COCO (a JSON) or YOLO (`data.yaml`, or its folder).
 
     Args:
         path: File or folder of the annotations.
@@ -29,12 +28,10 @@ def read_dataset(path: Path, pictures: Path | None = None) -> Dataset:
         dataset = read_coco(path, pictures)
     elif path.suffix in _YAML or _is_yolo(path):
         dataset = read_yolo(path, pictures)
-    elif path.is_dir() and any(_xml_in(path)):
-        dataset = read_voc(path, pictures)
     else:
         raise ConfigError(
-            f"{path} holds no annotations that are known: give COCO's .json, YOLO's data.yaml or "
-            "folder (images, labels, classes.txt), or VOC's folder (Annotations, JPEGImages)"
+            f"{path} holds no annotations that are known: give COCO's .json, or YOLO's data.yaml "
+            "or folder (images, labels, classes.txt)"
         )
     if not dataset.pictures:
         raise ConfigError(f"{path} annotates no picture")
@@ -43,7 +40,3 @@ def read_dataset(path: Path, pictures: Path | None = None) -> Dataset:
 
 def _is_yolo(path: Path) -> bool:
     return (path / "data.yaml").is_file() or (path / "labels").is_dir()
-
-
-def _xml_in(path: Path) -> list[Path]:
-    return [*path.glob("*.xml"), *(path / "Annotations").glob("*.xml")]

@@ -1,4 +1,4 @@
-"""Annotations of three formats mean the same; malformed ones are named by file and place."""
+"""Annotations of both formats mean the same; malformed ones are named by file and place."""
 
 from __future__ import annotations
 
@@ -19,10 +19,6 @@ from tools.evaluation.reading import read_dataset
 pytest.importorskip("yaml")
 
 BOX = (20.0, 10.0, 60.0, 90.0)
-XML = """<annotation><filename>a.png</filename>
-<object><name>person</name><difficult>1</difficult>
-<bndbox><xmin>21</xmin><ymin>11</ymin><xmax>60</xmax><ymax>90</ymax></bndbox></object></annotation>
-"""
 
 
 def coco(**changes: object) -> dict[str, Any]:
@@ -36,35 +32,32 @@ def coco(**changes: object) -> dict[str, Any]:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A dataset in all three formats, of one picture of 200 x 100."""
-    for name in ("images", "JPEGImages", "labels", "Annotations"):
+    """A dataset in both formats, of one picture of 200 x 100."""
+    for name in ("images", "labels"):
         (tmp_path / name).mkdir()
     picture = cv2.imencode(".png", np.zeros((100, 200, 3), np.uint8))[1].tobytes()
-    for place in ("images/a.png", "JPEGImages/a.png"):
-        (tmp_path / place).write_bytes(picture)
+    (tmp_path / "images/a.png").write_bytes(picture)
     (tmp_path / "labels/a.txt").write_text("0 0.2 0.5 0.2 0.8\n")
     (tmp_path / "data.yaml").write_text("val: images\nnames: {0: person}\n")
-    (tmp_path / "Annotations/a.xml").write_text(XML)
     (tmp_path / "coco.json").write_text(json.dumps(coco()))
     return tmp_path
 
 
-def only(dataset: Dataset) -> tuple[bool, Path]:
-    """Whether the one thing of the one picture is ignored, and the picture; the box is right."""
+def only(dataset: Dataset) -> Path:
+    """The path of the one picture, whose one box is right."""
     (picture,) = dataset.pictures
     (thing,) = picture.things
     assert dataset.labels == ("person",) == (thing.label,)
     assert thing.box == pytest.approx(BOX)
-    return thing.ignored, picture.path
+    return picture.path
 
 
-def test_three_formats_of_one_box(folder: Path) -> None:
-    """Corner and size, fractions about the middle, and pixels that count from one."""
-    image, jpeg = folder / "images/a.png", folder / "JPEGImages/a.png"
-    assert only(read_dataset(folder / "coco.json", folder / "images")) == (False, image)
-    assert only(read_dataset(folder / "data.yaml")) == (False, image)
-    assert only(read_dataset(folder)) == (False, image)
-    assert only(read_dataset(folder / "Annotations")) == (True, jpeg)
+def test_two_formats_of_one_box(folder: Path) -> None:
+    """Corner and size, and fractions about the middle."""
+    image = folder / "images/a.png"
+    assert only(read_dataset(folder / "coco.json", folder / "images")) == image
+    assert only(read_dataset(folder / "data.yaml")) == image
+    assert only(read_dataset(folder)) == image
 
 
 def test_a_picture_without_a_text_shows_nothing(folder: Path) -> None:
@@ -175,36 +168,14 @@ def test_a_malformed_description_of_a_yolo_dataset(folder: Path, text: str, prob
         read_dataset(folder / "data.yaml")
 
 
-@pytest.mark.parametrize(
-    ("text", "problem"),
-    [
-        (XML.replace("<xmax>60", "<xmax>wide"), "object 1: bndbox must have the numbers"),
-        (XML.replace("<xmax>60", "<xmax>20"), "object 1: the box is empty"),
-        (XML.replace("<name>person</name>", ""), "object 1: has no name"),
-        (XML.replace("a.png", "../a.png"), "leads out of"),
-        (XML[:80], r"a.xml:\d+: is no XML"),
-        ('<!DOCTYPE a [<!ENTITY b "c">]>' + XML, "declares entities"),
-        ("<a>" * 50, "more than 40 levels"),
-        ("<svg/>", "of the kind 'svg'"),
-    ],
-)
-def test_malformed_voc_names_the_object(folder: Path, text: str, problem: str) -> None:
-    """Entities, which could grow without end, are not read."""
-    (folder / "Annotations/a.xml").write_text(text)
-    with pytest.raises(ConfigError, match=problem):
-        read_dataset(folder / "Annotations")
-
-
-@pytest.mark.parametrize("place", ["Annotations", "data.yaml"])
-def test_annotations_are_counted(folder: Path, monkeypatch: pytest.MonkeyPatch, place: str) -> None:
+def test_annotations_are_counted(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Over all pictures, as they are read."""
     monkeypatch.setattr(dataset, "MOST_THINGS", 1)
-    assert len(read_dataset(folder / place).pictures) == 1
-    (folder / "Annotations/b.xml").write_text(XML)
+    assert len(read_dataset(folder).pictures) == 1
     for name in ("images/b.png", "labels/b.txt"):
         (folder / name).write_bytes((folder / name.replace("b.", "a.")).read_bytes())
     with pytest.raises(ConfigError, match="has more than 1 annotations"):
-        read_dataset(folder / place)
+        read_dataset(folder)
 
 
 @pytest.mark.parametrize(

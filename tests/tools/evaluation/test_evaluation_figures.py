@@ -79,7 +79,7 @@ def test_a_box_is_right_for_one_thing_only_and_of_its_class_only() -> None:
 
 
 def test_what_is_ignored_need_not_be_found_and_may_be() -> None:
-    """As a crowd in COCO, or what is difficult in VOC."""
+    """As a crowd in COCO."""
     crowd = Thing("person", BOX, ignored=True)
     assert evaluated(dataset([crowd]), []).overall.things == 0
     seen = evaluated(dataset([crowd]), [Detection(BOX, "person", 0.9)])

@@ -1,4 +1,4 @@
-"""Annotations of pictures: COCO's JSON, YOLO's YAML and lines, Pascal VOC's XML."""
+"""Annotations of pictures: COCO's JSON, YOLO's YAML and lines."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["run", "seeds"]
 
 _FOLDER = Path(tempfile.mkdtemp(prefix="aerodaas-fuzz-"))
 _PICTURE = cv2.imencode(".png", np.zeros((40, 60, 3), np.uint8))[1].tobytes()
-for _name in ("coco", "images", "labels", "Annotations"):
+for _name in ("coco", "images", "labels"):
     (_FOLDER / _name).mkdir()
 (_FOLDER / "images/a.png").write_bytes(_PICTURE)
 
@@ -36,11 +36,6 @@ def seeds() -> Iterable[bytes]:
     yield b"j" + json.dumps(content).encode()
     yield b"ypath: .\nval: images\nnames:\n  0: person\n  1: car\n"
     yield b"t0 0.5 0.5 0.25 0.5\n1 0.25 0.25 0.1 0.1\n"
-    yield (
-        b"x<annotation><filename>a.png</filename><object><name>car</name><difficult>0</difficult>"
-        b"<bndbox><xmin>1</xmin><ymin>2</ymin><xmax>30</xmax><ymax>40</ymax></bndbox></object>"
-        b"</annotation>"
-    )
 
 
 def run(data: bytes) -> None:
@@ -49,8 +44,7 @@ def run(data: bytes) -> None:
     (_FOLDER / "data.yaml").write_bytes(content if kind == b"y" else b"names: [person, car]\n")
     (_FOLDER / "labels/a.txt").write_bytes(content if kind == b"t" else b"")
     (_FOLDER / "coco/a.json").write_bytes(content if kind == b"j" else b"")
-    (_FOLDER / "Annotations/a.xml").write_bytes(content if kind == b"x" else b"<annotation/>")
-    path = {b"j": "coco/a.json", b"x": "Annotations"}.get(kind, "data.yaml")
+    path = "coco/a.json" if kind == b"j" else "data.yaml"
     try:
         dataset = read_dataset(_FOLDER / path)
     except AeroDaaSError as error:
