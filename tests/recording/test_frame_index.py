@@ -120,13 +120,6 @@ def test_any_time_gives_the_last_picture_captured(film: FrameIndex, times: list[
             assert one["item"]["of"]["header"]["stamp"] == CAPTURED[number]
 
 
-def test_there_is_no_other_stream(film: FrameIndex) -> None:
-    """Nor a picture of what is none."""
-    for name in ("tello/other", FOUND, ""):
-        with pytest.raises(KeyError):
-            film.at(name, 0)
-
-
 def test_another_cameras_boxes_are_not_drawn(tmp_path: Path) -> None:
     """Two cameras may capture at the same nanosecond."""
     path = tmp_path / "flight.mcap"

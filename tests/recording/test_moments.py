@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 from synthetic_flight import PROVENANCE
 
 from aerodaas.config.model import RecordingConfig
@@ -39,19 +38,6 @@ def told(found: list[Moment]) -> list[tuple[float, str]]:
     return [(moment.stamp / SECOND, moment.reason) for moment in found]
 
 
-def test_without_events_they_are_spread_evenly() -> None:
-    """Of 101 frames, 5 are the first, each quarter's and the last; one frame is shown once."""
-    assert told(key_moments(flight(*range(101)), 5)) == [
-        (0, CAMERA),
-        (25, CAMERA),
-        (50, CAMERA),
-        (75, CAMERA),
-        (100, CAMERA),
-    ]
-    assert told(key_moments(flight(3), 5)) == [(3, CAMERA)]
-    assert told(key_moments(flight(3, 4), 5)) == [(3, CAMERA), (4, CAMERA)]
-
-
 def test_the_frame_shown_is_the_first_from_then_on() -> None:
     """At a frame's own time that frame; a moment later the next; after the last one, the last."""
     made = flight(1, 2, 3)
@@ -77,15 +63,6 @@ def test_first_and_surest_sightings_come_before_all_else() -> None:
     made.alerts = [(7.0, "low", "battery low")]
     assert told(key_moments(made, 2)) == [(1, "first dog"), (4, "surest dog")]
     assert told(key_moments(made, 3))[2] == (7, "alert: battery low")
-
-
-@pytest.mark.parametrize(("most", "labels"), [(1, 1), (7, 1), (8, 2), (12, 3)])
-def test_a_quarter_of_the_labels_have_their_first_sighting_shown(most: int, labels: int) -> None:
-    """One label of up to seven moments, two of eight, three of twelve, those met first."""
-    made = flight(*range(100))
-    made.sightings = [seen(10 + number, f"kind {number}", 0.5) for number in range(9)]
-    found = [reason for _, reason in told(key_moments(made, most)) if "kind" in reason]
-    assert found == [f"first kind {number}" for number in range(labels)]
 
 
 def test_sightings_are_in_their_own_cameras_frames() -> None:

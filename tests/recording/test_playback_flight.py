@@ -16,7 +16,6 @@ from aerodaas.clock import seconds
 from aerodaas.messages.mission import Decision
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.protocol.playback import RecordedOut
-from aerodaas.recording.pictures import shots
 from aerodaas.recording.playback import flight as playback
 from aerodaas.recording.playback import track
 from aerodaas.recording.playback.flight import DecisionSums, read_flight
@@ -65,16 +64,6 @@ def test_a_page_gets_no_secrets_of_a_state(path: Path) -> None:
     """Truth and further figures are the recording's alone, and as long as a stranger likes."""
     told = read(path).tracks["tello"].states
     assert all(not (one.truth or one.extra or one.faults or one.actuators) for one in told)
-
-
-def test_the_first_picture_is_told(path: Path) -> None:
-    """By when it was captured; a flight without a camera has none."""
-    with Recording.open(path) as recording:
-        captured = min(shot.header.stamp for shot in shots(recording))
-    assert read(path).pictured == seconds(captured)
-    blind = path.with_name("blind.mcap")
-    record(blind, SyntheticFlight())
-    assert read(blind).pictured is None
 
 
 def test_statuses_tell_how_far_the_battery_lasts(path: Path) -> None:
@@ -184,16 +173,6 @@ def test_one_that_breaks_off_plays_as_far_as_it_goes(path: Path, tmp_path: Path)
         before = block.start - recording.epoch_ns - 1
         assert list(recording.records(until=before))
         assert recording.damaged == 0
-
-
-def test_what_it_is_told_says_how_far_it_has_come(path: Path) -> None:
-    """Shares from 0 to 1, and no less than before."""
-    told: list[float] = []
-    with Recording.open(path) as recording:
-        read_flight(recording, told.append)
-    assert told == sorted(told)
-    assert told[0] == 0
-    assert 0.5 < told[-1] <= 1
 
 
 def test_a_long_flight_is_thinned_out(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

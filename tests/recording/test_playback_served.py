@@ -24,7 +24,6 @@ from aerodaas.protocol.schemas import MissionOut
 from aerodaas.recording.reader import Recording
 from aerodaas.service.live import playback
 from aerodaas.service.live.playback import Player, Players
-from aerodaas.service.own.recordings import RecordingServer
 
 PLAYBACK = "/v1/missions/own/playback"
 PICTURE = f"{PLAYBACK}/picture?stream=tello/camera&at="
@@ -166,14 +165,6 @@ def test_two_are_served_side_by_side(path: Path, tmp_path: Path) -> None:
         status, said = ask(address, "/v1/missions/own-3/playback")
         assert status == 404
         assert "there is own, own-2" in said.decode()
-
-
-def test_a_taken_address_is_told(path: Path) -> None:
-    """With the option that names another one."""
-    with served(path) as address, Recording.open(path) as recording:
-        port = address.partition("/#")[0].rpartition(":")[2]
-        with pytest.raises(ConfigError, match="give another --address"):
-            RecordingServer(f"127.0.0.1:{port}", [recording])
 
 
 @pytest.mark.parametrize(

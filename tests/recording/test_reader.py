@@ -104,27 +104,6 @@ def test_less_than_the_first_mark_is_no_recording(tmp_path: Path, size: int) -> 
         assert not recording.complete
 
 
-@pytest.mark.parametrize("zeros", [1, 8, 9, 17, 18, 1000])
-@pytest.mark.parametrize("kind", ["no chunks", "chunks"])
-def test_zeros_after_the_last_message_end_it(tmp_path: Path, kind: str, zeros: int) -> None:
-    """However many a power failure left behind, they are no message and no proper end."""
-    path = write_file(tmp_path / "a.mcap", FLIGHT, kind, finish=False)
-    path.write_bytes(path.read_bytes() + bytes(zeros))
-    with Recording.open(path) as recording:
-        assert [it.sequence for it in recording.records()] == [0, 1, 2, 3]
-        assert (recording.complete, recording.damaged) == (False, 0)
-
-
-@pytest.mark.parametrize("missing", [1, 8, 9])
-def test_without_its_last_bytes_a_file_was_not_closed(tmp_path: Path, missing: int) -> None:
-    """All messages are there; that the end is missing is told."""
-    path = write_file(tmp_path / "a.mcap", FLIGHT, "no index")
-    path.write_bytes(path.read_bytes()[:-missing])
-    assert numbers(path) == [0, 1, 2, 3]
-    with Recording.open(path) as recording:
-        assert not recording.complete
-
-
 @pytest.mark.parametrize("body", [b"", b"other people's"])
 @pytest.mark.parametrize("place", ["first", "last"])
 def test_records_of_kinds_unknown_are_passed_over(tmp_path: Path, body: bytes, place: str) -> None:
@@ -168,15 +147,6 @@ def test_damage_in_what_nobody_asks_for_is_not_looked_at(tmp_path: Path) -> None
         for _ in range(2):
             assert len(list(recording.records(topics=["/a"]))) == 2
             assert recording.damaged == 1
-
-
-def test_a_message_that_cannot_be_decoded_is_left_out(tmp_path: Path) -> None:
-    """It is counted as damage; those after it are read."""
-    path = write_file(tmp_path / "a.mcap", FLIGHT, "no chunks")
-    path.write_bytes(path.read_bytes().replace(b'{"number": 1}', b'{"number": ?}'))
-    with Recording.open(path) as recording:
-        assert [it.value["number"] for it in recording.records()] == [0, 2, 3]
-        assert recording.damaged == 1
 
 
 def test_a_damaged_index_is_made_anew(tmp_path: Path) -> None:

@@ -119,13 +119,6 @@ def test_what_was_not_a_number_is_none_again(tmp_path: Path) -> None:
     assert math.isnan(back.gps.vertical_sigma)
 
 
-def test_an_autopilots_clock_costs_no_state(tmp_path: Path) -> None:
-    """Drivers tell seconds since 1970 among their figures; the whole state was taken for broken."""
-    extra = {"autopilot_clock": 1_800_000_076.0, "autopilot_time": 76.5, "microseconds": 1.8e15 / 2}
-    state = VehicleState(1, TRUTH, Battery(0.5), VehicleMode.GUIDED, armed=True, extra=extra)
-    assert played(tmp_path / "a.mcap", ("a", state))["a"] == [state]
-
-
 def test_a_report_counts_a_waypoint_once(tmp_path: Path) -> None:
     """One that an application sends again after it was visited is visited again, and is one."""
     late = Waypoint("late", 1, 1, 2)

@@ -332,19 +332,6 @@ def test_anything_else_becomes_json(tmp_path: Path) -> None:
     assert second.value == 17
 
 
-def test_provenance_comes_back(tmp_path: Path) -> None:
-    """Version, seed, configuration and source are in the file before the first message."""
-    path = tmp_path / "provenance.mcap"
-    FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE).close()
-    with Recording.open(path) as recording:
-        assert recording.provenance["seed"] == "7"
-        assert recording.provenance["aerodaas"] == "0.1.0"
-        assert recording.attachment("environment.json").decode() == PROVENANCE.config
-        assert recording.attachment("farm_survey.py").decode() == PROVENANCE.app_source
-        with pytest.raises(RecordingError, match=r"no attachment 'x'.*farm_survey\.py"):
-            recording.attachment("x")
-
-
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
     """A file that is there stays as it is."""
     path = tmp_path / "there.mcap"

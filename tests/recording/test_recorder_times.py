@@ -63,14 +63,6 @@ def test_the_length_is_from_the_first_message_to_the_latest(tmp_path: Path) -> N
         assert recording.duration == 4.0
 
 
-@pytest.mark.parametrize(("seconds", "length"), [((), 0.0), ((6,), 0.0), ((0, 6), 6.0)])
-def test_the_length_of_next_to_nothing(
-    tmp_path: Path, seconds: tuple[float, ...], length: float
-) -> None:
-    """No message and one message take no time; time counts from a first one at 0, too."""
-    assert written(tmp_path / "a.mcap", *map(message, seconds)).duration == length
-
-
 def test_each_record_has_its_times_and_its_number(tmp_path: Path) -> None:
     """Published at 3 s and measured at 2.9 s; the number is the message's own."""
     path = tmp_path / "a.mcap"
@@ -185,31 +177,6 @@ def test_a_live_view_gets_what_the_file_gets(tmp_path: Path) -> None:
     assert sorted(live.seen) == sorted(kept)
     assert live.seen[-2:] == [("/log", EPOCH + 3 * SECOND), ("/nav/it/battery", EPOCH + 4 * SECOND)]
     assert {time for topic, time in live.seen if "fence" in topic} == {EPOCH}
-
-
-def test_streams_of_one_kind_share_a_schema(tmp_path: Path) -> None:
-    """Two batteries, two topics, one schema in the file; JSON and protobuf are named as such."""
-    path = tmp_path / "a.mcap"
-    written(
-        path,
-        message(1, Battery(0.5)),
-        message(2, Battery(0.5), stream="nav/other"),
-        message(3, Battery(0.4)),
-        message(4),
-    )
-    with Recording.open(path) as recording:
-        told = {name: (it.encoding, it.count) for name, it in recording.topics.items()}
-    assert told == {
-        "/nav/it/battery": ("json", 2),
-        "/nav/other/battery": ("json", 1),
-        "/log": ("protobuf", 1),
-    }
-    with path.open("rb") as file:
-        summary = make_reader(file).get_summary()
-        assert summary is not None
-        schemas = {one.name: one.encoding for one in summary.schemas.values()}
-        assert len(summary.schemas) == 2
-    assert schemas == {"aerodaas.Battery": "jsonschema", "foxglove.Log": "protobuf"}
 
 
 @pytest.mark.parametrize(

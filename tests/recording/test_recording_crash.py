@@ -47,26 +47,6 @@ print("written", flush=True)
 time.sleep(600)
 """
 
-FILLER = """
-import resource
-resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, 500_000))
-told, further = [], 0
-for message in SyntheticFlight(frames=4).messages():
-    try:
-        recorder.write(message)
-    except RecordingError as error:
-        told.append(str(error))
-    further += bool(told)
-    if further == 200:
-        break
-summary = recorder.close()
-assert len(told) == 1, told
-assert told[0] == summary.stopped
-assert sum(summary.drops.values()) >= 200
-assert summary.size <= 500_000
-print(told[0])
-"""
-
 
 def start(program: str, path: Path) -> subprocess.Popen[str]:
     """Run a recorder in a process of its own."""
@@ -111,18 +91,6 @@ def states(path: Path) -> int:
     """Vehicle states that can be read; three of our flight's messages come with each."""
     with Recording.open(path) as recording:
         return sum(1 for _ in recording.records(schemas={"aerodaas.VehicleState"}))
-
-
-def test_full_disk_stops_recording_once_and_clearly(tmp_path: Path) -> None:
-    """The flight goes on, one error says why, and the file ends at a whole record."""
-    path = tmp_path / "full.mcap"
-    with start(FILLER, path) as process:
-        output, _ = process.communicate(timeout=120)
-    assert process.returncode == 0
-    assert "full.mcap could not be written any further" in output
-    with Recording.open(path) as recording:
-        assert sum(1 for _ in recording.records()) > 100
-        assert recording.damaged == 0
 
 
 @given(st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), max_size=8))

@@ -111,16 +111,6 @@ def test_words_between_backticks_are_code(tmp_path: Path) -> None:
     assert "<th>`x`</th><td>see <code>&lt;b&gt;</code> and a lone `</td>" in page
 
 
-def test_states_cover_the_flight(recorded: Path) -> None:
-    """Bands follow one another without gaps, and every moment has its state."""
-    with Recording.open(recorded) as recording:
-        robot = RecordedFlight.read(recording).robots["tello"]
-    assert all(a.end == b.start for a, b in zip(robot.bands, robot.bands[1:], strict=False))
-    assert [band.state for band in robot.bands[:3]] == ["preflight", "taking_off", "enroute"]
-    middle = np.array([(band.start + band.end) / 2 for band in robot.bands])
-    assert robot.state_at(middle) == [band.state for band in robot.bands]
-
-
 def test_two_robots_and_a_cut_off_file(tmp_path: Path) -> None:
     """Each robot has its figures; a file that was not closed says so."""
     path = tmp_path / "two.mcap"
