@@ -1,4 +1,4 @@
-"""The paper's five mission patterns, each an application flown through the real actors."""
+"""The paper's mission patterns; (d), and (e) by what a camera sees, are `test_flown_listings`."""
 
 from __future__ import annotations
 
@@ -131,51 +131,6 @@ def test_c_sensor_driven_from_nothing(flyer: Flyer) -> None:
     assert "navigation has been silent" in mission.outcome
     assert np.linalg.norm(mission.position[:, :2], axis=1).max() > 8.0
     assert np.linalg.norm(mission.position[-1]) < 1.0
-
-
-def test_d_urgent_navigation_preempts_and_the_plan_resumes(flyer: Flyer) -> None:
-    """(d) Commands of priority 1 lead away from a waypoint, to which the drone then goes back."""
-
-    def survey(env: Environment) -> None:
-        drone = env.get_robot_by_id("drone")
-        odometry = drone.get_sensor_by_id("odom").get_data_stream()
-        aside = VelocityCommand(left=2.0, priority=1)
-        event = Drift(8.0, 12.0, aside).analyse(odometry)
-        scheduler = env.trajectory_scheduler()
-        scheduler.add_navigation(AeroNavigation(NavigationType.ANALYTICS_DRIVEN, event))
-        drone.navigate(hop((20, 0), (20, 20)))
-
-    mission = flown(flyer.fly(survey, environment()))
-    assert mission.visited == ("wp0", "wp1")
-    way = states(mission)
-    diverted = way.index("diverted")
-    assert way[diverted - 1 : diverted + 2] == ["enroute", "diverted", "enroute"]
-    during = (mission.time > 8.0) & (mission.time < 12.0)
-    assert mission.position[during, 0].max() < 19.0, "wp0 came after the event"
-    assert mission.position[mission.time < 14.0, 1].max() > 4.0
-
-
-def test_e_abort_forgets_the_plan(flyer: Flyer) -> None:
-    """(e) On the event the queue is emptied; what follows is flown, the old plan never again."""
-
-    def search(env: Environment) -> None:
-        drone = env.get_robot_by_id("drone")
-        odometry = drone.get_sensor_by_id("odom").get_data_stream()
-        aside = VelocityCommand(left=2.0)
-        found = Drift(8.0, 12.0, aside).analyse(odometry)
-        drone.navigate(hop((40, 0), (40, 40)))
-        scheduler = env.trajectory_scheduler()
-        scheduler.clear_navigation()
-        scheduler.add_navigation(found)
-
-    mission = flown(flyer.fly(search, environment()))
-    assert mission.visited == ()
-    assert set(mission.plan) == {"wp0", "wp1"}
-    way = states(mission)
-    assert "diverted" not in way
-    after = way[way.index("following") :]
-    assert after == ["following", "holding", "returning", "landing", "landed"]
-    assert mission.position[:, 0].max() < 20.0
 
 
 def test_e_abort_by_an_event_alone(flyer: Flyer) -> None:

@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 import pytest
 from analyses import Above, Broken, Jitter, Ticker, Unwritten
-from flying import FLAT, Flyer, hop, recorded, robot
+from flying import Flyer, hop, recorded
 from one_drone import drone_of, long, odometry_of, short, state_of
 
-from aerodaas import AeroListData, Environment, Odometry, Waypoint
+from aerodaas import Environment, Odometry
 from aerodaas.errors import GraphError, MissionError
 from aerodaas.messages.mission import MissionState
 from aerodaas.recording.reader import Recording
@@ -24,19 +24,6 @@ def until(condition: Callable[[], bool]) -> None:
     while not condition():
         assert time.monotonic() < deadline, "it never happened"
         time.sleep(0.005)
-
-
-def test_a_flight_visits_its_waypoint_and_lands(flyer: Flyer) -> None:
-    """Without Ray, and faster than the clock."""
-    began = time.monotonic()
-    run = flyer.fly(short)
-    flight = recorded(run)
-    assert run.in_simulated_time
-    assert flight.robots["drone"].outcome.startswith("landed")
-    assert flight.robots["drone"].visited == ("wp0",)
-    assert flight.alerts == []
-    assert time.monotonic() - began < float(flight.robots["drone"].time[-1])
-    assert {report.phase for report in run.reports().values()} == {"done"}
 
 
 def test_the_application_reads_streams_in_flight(flyer: Flyer) -> None:
@@ -80,20 +67,6 @@ def test_a_paused_drone_hovers_until_it_is_resumed(flyer: Flyer) -> None:
     flight = recorded(env.launch())
     assert flight.robots["drone"].visited == ("wp0",)
     assert "paused" in [band.state for band in flight.robots["drone"].bands]
-
-
-def test_waypoints_added_in_flight_are_flown(flyer: Flyer) -> None:
-    """`add_navigation` and `clear_navigation` work on a mission that runs."""
-    content = {**FLAT, "robots": [robot(mission={"on_complete": "hold"})]}
-    with flyer.flying(long, content) as env:
-        until(lambda: state_of(env) is MissionState.LOITERING)
-        scheduler = env.trajectory_scheduler()
-        scheduler.clearNavigation()
-        until(lambda: state_of(env) is MissionState.HOLDING)
-        scheduler.addNavigation(AeroListData([Waypoint("extra", 2, 2, 2)]))
-        until(lambda: "extra" in env.launch().poll().robots["drone"].mission.visited)
-        drone_of(env).end_mission()
-    assert recorded(env.launch()).robots["drone"].outcome.startswith("landed: ")
 
 
 def test_an_analysis_that_raises_does_not_end_the_mission(flyer: Flyer) -> None:

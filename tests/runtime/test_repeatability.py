@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from analyses import Above, Jitter, Ticker, Weave, Wish
-from flying import FLAT, Flyer, hop, recorded, robot
+from flying import Flyer, hop, recorded
 
 from aerodaas import Environment
 from aerodaas.recording.report.flight import RecordedFlight
@@ -95,28 +95,3 @@ def test_wakes_and_external_sources_are_waited_for(flyer: Flyer) -> None:
     assert "wish" in first.robots["drone"].plan
     for _ in range(2):
         assert same(first, fly(flyer, build))
-
-
-@pytest.mark.slow
-def test_several_robots_and_a_camera_share_one_time(flyer: Flyer) -> None:
-    """Two drones and a rendered camera repeat to the last bit."""
-    camera = {
-        "id": "cam",
-        "type": "camera",
-        "rate": 7,
-        "settings": {"width": 64, "height": 36},
-    }
-    sensors = [{"id": "odom", "type": "odometry", "rate": 15}, camera]
-    two = [robot("one", sensors=sensors), robot("two", start=[0, 6, 0])]
-
-    def build(env: Environment) -> None:
-        one, other = (env.get_robot_by_id(name) for name in ("one", "two"))
-        one.get_sensor_by_id("odom").get_data_stream()
-        one.navigate(hop((3, 0)))
-        other.navigate(hop((3, 6)))
-
-    first = fly(flyer, build, {**FLAT, "robots": two})
-    assert set(first.robots) == {"one", "two"}
-    seconds = float(first.robots["one"].time[-1])
-    assert first.frames["one/cam"] == pytest.approx(7 * seconds, abs=2)
-    assert same(first, fly(flyer, build, {**FLAT, "robots": two}))
