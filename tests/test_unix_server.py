@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import socket
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from waiting import until
 
 from aerodaas.unix_server import UnixServer, fits_a_socket
 
@@ -53,14 +53,6 @@ def answers(connection: socket.socket) -> bool:
         return connection.recv(16) == b"hello"
     except OSError:
         return False
-
-
-def until(condition: Callable[[], bool]) -> None:
-    """Wait until something holds."""
-    end = time.monotonic() + 10.0
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 @pytest.mark.usefixtures("server")

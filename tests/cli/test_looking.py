@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import socket
-import time
 from pathlib import Path
 from typing import Any, Literal
 
@@ -114,11 +113,3 @@ def test_what_a_flight_would_meet_is_judged(fallback: str, *, objects: bool) -> 
         finally:
             vehicle.close()
         assert not autopilot.armed
-
-
-def until(condition: Any) -> None:  # noqa: ANN401 - a function without arguments
-    """Wait until something holds."""
-    end = time.monotonic() + 15.0
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.02)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import asdict
@@ -11,6 +10,7 @@ from typing import Any
 
 import pytest
 from hovering import Run, ask, console, token_of
+from waiting import until
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
@@ -235,10 +235,8 @@ def test_the_list_before_take_off_is_told_to_whoever_watches() -> None:
         nothing: dict[str, Any] = {"age": None, "items": []}
         assert ask(watcher, "/v1/robots/drone/preflight")[2] == nothing
         run.health = HealthReport((windy,), 0.5)
-        until = time.monotonic() + 20.0
-        while not (found := ask(watcher, "/v1/robots/drone/preflight")[2])["items"]:
-            assert time.monotonic() < until
-            time.sleep(0.05)
+        until(lambda: ask(watcher, "/v1/robots/drone/preflight")[2]["items"])
+        found = ask(watcher, "/v1/robots/drone/preflight")[2]
         assert found["age"] == 0.5
         assert found["items"] == [{**asdict(windy), "verdict": "warning"}]
         status, _, answer = ask(watcher, "/v1/robots/other/preflight")

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from flight_orders import order_in
 from served_flight import Drones, ServedFlight
+from waiting import until
 
 from aerodaas.analytics.wire_items import pack
 from aerodaas.clock import host_time_ns
@@ -210,10 +211,7 @@ def test_an_operators_word_waits_for_no_users(
         assert begun.wait(20)
         assert flight.end().accepted
         assert sum(one.done() for one in asked) <= 40 - link._MOST_ASKED
-        until = time.monotonic() + 20
-        while sum(one.done() for one in asked) < 40 - link._MOST_ASKED:
-            assert time.monotonic() < until
-            time.sleep(0.01)
+        until(lambda: sum(one.done() for one in asked) == 40 - link._MOST_ASKED)
         free.set()
     refused = [one for one in asked if one.exception()]
     assert len(refused) == 40 - link._MOST_ASKED
@@ -268,14 +266,11 @@ def test_who_watches_much_keeps_nobody_from_commanding(
         flight.camera("crowd").open()
     late = FlightLink(flight.folder)
     assert late.change_lease(FlightLeaseIn(ends=time.time() + 60)).accepted
-    until = time.monotonic() + 20.0
-    while not late.number:
-        assert time.monotonic() < until
+    until(lambda: late.number)
     late.close()
     # Each is closed with its generator.
     views.clear()
-    while not _shows(flight.link.items("one/cam")):
-        assert time.monotonic() < until
+    until(lambda: _shows(flight.link.items("one/cam")))
     flight.close()
 
 
@@ -344,15 +339,10 @@ def test_a_state_that_cannot_be_read_is_told_of(
 ) -> None:
     """Once: a page would show the flight as it was, without a word."""
     monkeypatch.setattr(flight.flight, "text", lambda _: ('{"id": "of another version"}', False))
-    until = time.monotonic() + 20.0
-    while not caplog.records:
-        assert time.monotonic() < until
-        time.sleep(0.01)
+    until(lambda: caplog.records)
     monkeypatch.undo()
     number = flight.link.number
-    while flight.link.number < number + 2:
-        assert time.monotonic() < until
-        time.sleep(0.01)
+    until(lambda: flight.link.number >= number + 2)
     (record,) = caplog.records
     assert "its state cannot be read" in record.getMessage()
 
@@ -402,7 +392,4 @@ def test_what_fails_in_the_flight_is_told_of(
     monkeypatch.setattr(flight.pictures, "latest_packed", fail)
     assert camera.capture(0, None) is None
     assert camera.finished
-    until = time.monotonic() + 20.0
-    while "KeyError: 'missing'" not in caplog.text:
-        assert time.monotonic() < until
-        time.sleep(0.01)
+    until(lambda: "KeyError: 'missing'" in caplog.text)

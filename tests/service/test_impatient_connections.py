@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 
 import pytest
+from waiting import until
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
@@ -181,9 +182,7 @@ def test_clients_that_take_no_answer_make_room_for_others(port: int) -> None:
     greedy = [client(port) for _ in range(_MOST)]
     for one in greedy:
         one.sendall(HEAD.replace(b"POST /", b"POST /large") + b"body")
-    end = time.monotonic() + _ENOUGH
-    while not _answers(port):
-        assert time.monotonic() < end
+    until(lambda: _answers(port))
     for one in greedy:
         with suppress(ConnectionError):
             assert len(_rest(one)) < _LARGE
@@ -301,9 +300,7 @@ def test_a_server_has_so_many_connections(port: int) -> None:
         with connect(f"ws://127.0.0.1:{port}/", open_timeout=_ENOUGH), client(port) as late:
             late.sendall(HEAD + b"body")
             assert late.recv(1000).startswith(b"HTTP/1.1 503")
-        end = time.monotonic() + _ENOUGH
-        while not _answers(port):
-            assert time.monotonic() < end
+        until(lambda: _answers(port))
 
 
 def _masked(size: int) -> bytes:

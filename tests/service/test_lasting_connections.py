@@ -8,7 +8,7 @@ import json
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, cast
@@ -16,6 +16,7 @@ from typing import Any, cast
 import pytest
 from served import document, fleet, robot
 from served_flight import Drones, ServedFlight
+from waiting import until
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
@@ -129,14 +130,6 @@ class Service:
         flight = ServedFlight(folder, Drones(self.settings.config), watch)
         self.relay = flight.relay
         return flight
-
-
-def until(look: Callable[[], object]) -> None:
-    """Wait until something is so."""
-    end = time.monotonic() + ENOUGH
-    while not look():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ import time
 
 import psutil
 import pytest
+from waiting import until
 
 STARTED = """
 import subprocess, sys, time
@@ -54,11 +55,7 @@ def test_a_tied_process_ends_with_its_starter_and_takes_its_own_along(number: in
             assert not any(map(gone, (tied, tied_own, other)))
             os.kill(starter.pid, number)
             starter.wait(SECONDS)
-            until = time.monotonic() + SECONDS
-            while not (gone(tied) and gone(tied_own)) and time.monotonic() < until:
-                time.sleep(0.05)
-            assert gone(tied)
-            assert gone(tied_own)
+            until(lambda: gone(tied) and gone(tied_own), SECONDS)
             assert not gone(other)
         finally:
             for process in (tied, tied_own, other):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 import scripted_vehicle
 from scripted_fleet import fleet_of
 from scripted_vehicle import Script
+from waiting import until
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.messages.health import Verdict
@@ -42,14 +43,6 @@ def watcher(script: Script) -> Iterator[VehicleWatcher]:
     script.armed, script.breaks = False, None
     made.want(wanted=False)
     until(lambda: not made.report.held)
-
-
-def until(condition: Callable[[], bool], seconds: float = 10.0) -> None:
-    """Wait until something holds."""
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)
 
 
 def test_it_reads_and_commands_nothing(watcher: VehicleWatcher, script: Script) -> None:
