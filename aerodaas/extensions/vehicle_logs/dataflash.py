@@ -59,22 +59,12 @@ _TOPICS: tuple[tuple[Topic, str, dict[str, tuple[str, float]]], ...] = (
         "ATT",
         {"roll": ("DesRoll", 1), "pitch": ("DesPitch", 1), "heading": ("DesYaw", 1)},
     ),
-    ("position", "XKF1", {"east": ("PE", 1), "north": ("PN", 1), "up": ("PD", -1)}),
     ("velocity", "XKF1", {"east": ("VE", 1), "north": ("VN", 1), "up": ("VD", -1)}),
     ("vibration", "VIBE", {"x": ("VibeX", 1), "y": ("VibeY", 1), "z": ("VibeZ", 1)}),
-    ("gps accuracy", "GPA", {"horizontal": ("HAcc", 1), "vertical": ("VAcc", 1)}),
-    ("gps satellites", "GPS", {"satellites": ("NSats", 1)}),
 )
 """Topic, message, and each column's field with its sign."""
-_SETPOINTS = (
-    ("east", "PSCE", "TPE", 1.0),
-    ("north", "PSCN", "TPN", 1.0),
-    ("up", "PSCD", "TPD", -1.0),
-)
-"""Position setpoint, whose axes are messages of their own: column, message, field, sign."""
 _WANTED = {
     *(message for _, message, _ in _TOPICS),
-    *(message for _, message, _, _ in _SETPOINTS),
     *("ERR", "MSG", "PARM", "RCOU"),
 }
 
@@ -131,9 +121,7 @@ def read_dataflash(content: bytes | memoryview) -> VehicleLog:
         for topic, message, columns in _TOPICS
         if (series := _series(tables.get(message), scales, message, columns)) is not None
     }
-    setpoint, motors = _setpoint(tables, scales), _motors(tables)
-    if setpoint is not None:
-        topics["position setpoint"] = setpoint
+    motors = _motors(tables)
     if motors is not None:
         topics["motors"] = motors
     texts = tuple(sorted((*_messages(tables), *_errors(tables)), key=lambda one: one.time))
@@ -219,27 +207,6 @@ def _series(
         for name, (field, sign) in columns.items()
     }
     return Series(_seconds(table), values)
-
-
-def _setpoint(
-    tables: Mapping[str, _Table], scales: Mapping[str, Mapping[str, float]]
-) -> Series | None:
-    parts = {
-        column: _series(tables.get(message), scales, message, {column: (field, sign)})
-        for column, message, field, sign in _SETPOINTS
-    }
-    known = {column: part for column, part in parts.items() if part is not None}
-    if not known:
-        return None
-    # The axes are written one after the other, each with a stamp of its own.
-    time = np.concatenate([part.time for part in known.values()])
-    columns: dict[str, Floats] = {}
-    begin = 0
-    for column, part in known.items():
-        columns[column] = np.full(len(time), np.nan)
-        columns[column][begin : begin + len(part.time)] = part.columns[column]
-        begin += len(part.time)
-    return Series(time, columns)
 
 
 def _motors(tables: Mapping[str, _Table]) -> Series | None:

@@ -17,23 +17,16 @@ Topic = Literal[
     "battery",
     "attitude",
     "attitude setpoint",
-    "position",
-    "position setpoint",
     "velocity",
     "vibration",
-    "gps accuracy",
-    "gps satellites",
     "motors",
 ]
-"""The main topics, with their columns:
+"""The topics that a recording does not hold itself, and the velocity by which it is compared:
 
 - battery: voltage (V), current (A);
 - attitude and its setpoint: roll, pitch, heading (degrees; nose right of north is positive);
-- position and its setpoint: east, north, up (metres from the autopilot's own origin);
 - velocity: east, north, up (m/s);
 - vibration: x, y, z, or one of all axes (m/s²);
-- gps accuracy: horizontal, vertical (metres);
-- gps satellites: satellites;
 - motors: one each (percent of full thrust or of its PWM range).
 """
 

@@ -1,9 +1,9 @@
-"""Plots of the main topics of vehicles' own logs, over mission time."""
+"""A plot of the main topics of a vehicle's own log, over mission time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -14,10 +14,9 @@ from aerodaas.recording.report.section import Drawing, ReportSection
 from aerodaas.text.printable import printable
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
-__all__ = ["log_drawings", "log_sections"]
+__all__ = ["log_drawing", "log_sections"]
 
 _ROW = 1.5
 """Inches of one row."""
@@ -25,30 +24,44 @@ _AROUND = 5.0
 """Seconds shown before and after the flight."""
 _TURN = 180.0
 """Degrees between two headings that are no turn, but the step at north."""
-_COLUMNS = ("east", "north", "up")
-_ANGLES = ("roll", "pitch", "heading")
 
-_Rows = Sequence[tuple[str, Sequence[tuple[Topic, str, str]]]]
-"""Label of each row's axis, and its lines: topic, column, name in the legend."""
+_Row: TypeAlias = tuple[str, Sequence[tuple[Topic, str, str]]]
+"""Label of a row's axis, and its lines: topic, column, name in the legend."""
 
 
-def log_drawings(number: int, attached: AttachedLog) -> Iterator[Drawing]:
-    """The plots that a log has data for.
+def log_drawing(number: int, attached: AttachedLog) -> Drawing | None:
+    """The plot of a log; None without data for it.
 
     Args:
         number: The log's number among those of the recording, from 1.
         attached: The log.
     """
-    log = attached.log
-    if log is None:
-        return
-    for name, what, rows in (*_FIGURES, *_variable(attached)):
-        known = [(label, [line for line in lines if _holds(log, *line)]) for label, lines in rows]
-        shown = [(label, lines) for label, lines in known if lines]
-        if shown:
-            title = f"From the autopilot's log: {what}"
-            file, description = f"vehicle_log_{number}_{name}", f"{title} over mission time"
-            yield Drawing(file, title, description, _maker(attached, shown))
+    rows = [] if attached.log is None else _rows(attached.log)
+    if not rows:
+        return None
+    title = "From the autopilot's log"
+    description = f"{title}: its main topics over mission time"
+    return Drawing(f"vehicle_log_{number}", title, description, lambda: _figure(attached, rows))
+
+
+def _rows(log: VehicleLog) -> list[_Row]:
+    rows: list[_Row] = [
+        ("Voltage (V)", [("battery", "voltage", "")]),
+        ("Current (A)", [("battery", "current", "")]),
+    ]
+    for angle in ("roll", "pitch", "heading"):
+        lines: list[tuple[Topic, str, str]] = [
+            ("attitude", angle, "measured"),
+            ("attitude setpoint", angle, "setpoint"),
+        ]
+        rows.append((f"{angle.capitalize()} (°)", lines))
+    # As many lines as the vehicle has axes or motors.
+    labels: dict[Topic, str] = {"vibration": "Vibration (m/s²)", "motors": "Motors (%)"}
+    for topic, label in labels.items():
+        names = log.topics[topic].columns if topic in log.topics else ()
+        rows.append((label, [(topic, name, name) for name in names]))
+    held = [(label, [line for line in lines if _holds(log, *line)]) for label, lines in rows]
+    return [(label, lines) for label, lines in held if lines]
 
 
 def _holds(log: VehicleLog, topic: Topic, column: str, _: str) -> bool:
@@ -57,88 +70,22 @@ def _holds(log: VehicleLog, topic: Topic, column: str, _: str) -> bool:
     return values is not None and bool(np.isfinite(values).any())
 
 
-_FIGURES: tuple[tuple[str, str, _Rows], ...] = (
-    (
-        "battery",
-        "battery",
-        (
-            ("Voltage (V)", [("battery", "voltage", "")]),
-            ("Current (A)", [("battery", "current", "")]),
-        ),
-    ),
-    (
-        "attitude",
-        "attitude and its setpoint",
-        [
-            (
-                f"{angle.capitalize()} (°)",
-                [("attitude", angle, "measured"), ("attitude setpoint", angle, "setpoint")],
-            )
-            for angle in _ANGLES
-        ],
-    ),
-    (
-        "position",
-        "position and its setpoint",
-        [
-            (
-                f"{axis.capitalize()} (m)",
-                [("position", axis, "estimated"), ("position setpoint", axis, "setpoint")],
-            )
-            for axis in _COLUMNS
-        ],
-    ),
-    (
-        "gps",
-        "GPS",
-        (
-            (
-                "Accuracy (m)",
-                [
-                    ("gps accuracy", "horizontal", "horizontal"),
-                    ("gps accuracy", "vertical", "vertical"),
-                ],
-            ),
-            ("Satellites", [("gps satellites", "satellites", "")]),
-        ),
-    ),
-)
-
-
-def _variable(attached: AttachedLog) -> Iterator[tuple[str, str, _Rows]]:
-    """Plots with as many lines as the vehicle has axes or motors."""
-    topics = attached.log.topics if attached.log else {}
-    told: tuple[tuple[Topic, str, str], ...] = (
-        ("vibration", "vibration", "Vibration (m/s²)"),
-        ("motors", "motors", "Motors (%)"),
-    )
-    for topic, what, label in told:
-        if topic in topics:
-            yield topic, what, [(label, [(topic, name, name) for name in topics[topic].columns])]
-
-
-def _maker(attached: AttachedLog, rows: _Rows) -> Callable[[], Figure]:
-    return lambda: _figure(attached, rows)
-
-
-def _figure(attached: AttachedLog, rows: _Rows) -> Figure:
+def _figure(attached: AttachedLog, rows: Sequence[_Row]) -> Figure:
     from aerodaas.recording.report.plots.style import (  # noqa: PLC0415 - needs the extra `plots`
         CYCLE,
         grid,
-        legend,
         new_figure,
     )
 
     figure = new_figure(1.1 + _ROW * len(rows))
     all_axes = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
-    handles: dict[str, Artist] = {}
     for axes, (label, lines) in zip(all_axes, rows, strict=True):
         for (topic, column, name), (colour, style) in zip(lines, CYCLE, strict=False):
             dashed = "--" if topic.endswith("setpoint") else style
             time, values = _line(attached, topic, column)
-            (line,) = axes.plot(time, values, dashed, color=colour, linewidth=1.2, label=name)
-            if name:
-                handles.setdefault(name, line)
+            axes.plot(time, values, dashed, color=colour, linewidth=1.2, label=name)
+        if lines[0][-1]:
+            axes.legend(loc="upper right", ncols=4, frameon=False, fontsize=8)
         axes.margins(x=0)
         axes.set_ylabel(label)
         grid(axes, "y")
@@ -146,7 +93,6 @@ def _figure(attached: AttachedLog, rows: _Rows) -> Figure:
     robot = f"{attached.robot}, " if attached.robot else ""
     autopilot = attached.log.autopilot if attached.log else ""
     all_axes[0].set_title(f"{robot}{autopilot}'s log {attached.file}", fontsize=9, loc="left")
-    legend(figure, list(handles.values()), columns=4)
     return figure
 
 
@@ -172,11 +118,11 @@ _HEAD = ("at (s)", "severity", "message of the autopilot")
 _MOST_TEXTS = 200
 """Messages of an autopilot that are listed."""
 _MOST_LOGS = 6
-"""Logs whose plots are drawn, six of each."""
+"""Logs that are drawn."""
 
 
 def log_sections(recording: Recording) -> list[ReportSection]:
-    """A section for each attached log: its messages, and plots of its main topics."""
+    """A section for each attached log: its messages, and a plot of its main topics."""
     return [_section(number, log) for number, log in enumerate(attached_logs(recording), 1)]
 
 
@@ -191,5 +137,5 @@ def _section(number: int, attached: AttachedLog) -> ReportSection:
     ]
     left_out = len(texts) - len(rows)
     note = f"{left_out} more messages are in the log." if left_out else ""
-    drawings = tuple(log_drawings(number, attached)) if number <= _MOST_LOGS else ()
-    return ReportSection(title, text, _HEAD, rows, note, drawings)
+    drawing = log_drawing(number, attached) if number <= _MOST_LOGS else None
+    return ReportSection(title, text, _HEAD, rows, note, () if drawing is None else (drawing,))

@@ -117,13 +117,13 @@ def _check_formats(header: ULog) -> None:
         width(name, ())
 
 
-def _fields(names: Mapping[str, str], sign: Mapping[str, float] | None = None) -> _Columns:
-    """Columns that are a field each, `sign` times its value."""
-    signs = sign or {}
-    return lambda data: {
-        column: signs.get(column, 1.0) * data[field].astype(np.float64)
-        for column, field in names.items()
-    }
+def _velocity(data: _Data) -> dict[str, Floats]:
+    north, east, down = (data[axis].astype(np.float64) for axis in ("vx", "vy", "vz"))
+    return {"east": east, "north": north, "up": -down}
+
+
+def _vibration(data: _Data) -> dict[str, Floats]:
+    return {"all axes": data["accel_vibration_metric"].astype(np.float64)}
 
 
 def _angles(prefix: str) -> _Columns:
@@ -162,29 +162,12 @@ def _motors(data: _Data) -> dict[str, Floats]:
     return columns
 
 
-_ENU = {"up": -1.0}
 _TOPICS: tuple[tuple[Topic, str, _Columns], ...] = (
     ("battery", "battery_status", _battery),
     ("attitude", "vehicle_attitude", _angles("q")),
     ("attitude setpoint", "vehicle_attitude_setpoint", _angles("q_d")),
-    (
-        "position",
-        "vehicle_local_position",
-        _fields({"east": "y", "north": "x", "up": "z"}, _ENU),
-    ),
-    (
-        "velocity",
-        "vehicle_local_position",
-        _fields({"east": "vy", "north": "vx", "up": "vz"}, _ENU),
-    ),
-    (
-        "position setpoint",
-        "vehicle_local_position_setpoint",
-        _fields({"east": "y", "north": "x", "up": "z"}, _ENU),
-    ),
-    ("vibration", "vehicle_imu_status", _fields({"all axes": "accel_vibration_metric"})),
-    ("gps accuracy", "vehicle_gps_position", _fields({"horizontal": "eph", "vertical": "epv"})),
-    ("gps satellites", "vehicle_gps_position", _fields({"satellites": "satellites_used"})),
+    ("velocity", "vehicle_local_position", _velocity),
+    ("vibration", "vehicle_imu_status", _vibration),
     ("motors", "actuator_motors", _motors),
 )
 """Topic, message, and how its columns come from the fields of the message's first instance."""

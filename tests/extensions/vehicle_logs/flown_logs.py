@@ -42,13 +42,8 @@ _FORMATS = {
     "ERR": (0x12, "QBB", "TimeUS,Subsys,ECode"),
     "BAT": (0x13, "QBff", "TimeUS,Inst,Volt,Curr"),
     "ATT": (0x14, "QccccCC", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw"),
-    "XKF1": (0x15, "QBffffff", "TimeUS,C,VN,VE,VD,PN,PE,PD"),
-    "PSCN": (0x16, "Qff", "TimeUS,TPN,PN"),
-    "PSCE": (0x17, "Qff", "TimeUS,TPE,PE"),
-    "PSCD": (0x18, "Qff", "TimeUS,TPD,PD"),
+    "XKF1": (0x15, "QBfff", "TimeUS,C,VN,VE,VD"),
     "VIBE": (0x19, "QBfffI", "TimeUS,IMU,VibeX,VibeY,VibeZ,Clip"),
-    "GPS": (0x1A, "QBBB", "TimeUS,I,Status,NSats"),
-    "GPA": (0x1B, "QBff", "TimeUS,I,HAcc,VAcc"),
     "RCOU": (0x1C, "QHHHHHH", "TimeUS,C1,C2,C3,C4,C5,C6"),
 }
 
@@ -123,14 +118,10 @@ def dataflash(flown: Flown, *, begin: float = 0.0, end: float | None = None) -> 
         log += _message("BAT", at, 0, 15.2 - now / 100, 11.0)
         log += _message("BAT", at, 1, 5.0, 0.5)
         log += _message("ATT", at, 110, 100, -210, -200, 9000, 8950)
-        log += _message("XKF1", at, 0, north, east, -up, 1.0, 2.0, -3.0)
-        log += _message("XKF1", at, 1, 99.0, 99.0, 99.0, 99.0, 99.0, 99.0)
-        log += _message("PSCN", at, 1.5, 1.0) + _message("PSCE", at + 1, 2.5, 2.0)
-        log += _message("PSCD", at + 2, -3.5, -3.0)
+        log += _message("XKF1", at, 0, north, east, -up)
+        log += _message("XKF1", at, 1, 99.0, 99.0, 99.0)
         log += _message("VIBE", at, 0, 3.0, 4.0, 5.0, 0)
         log += _message("RCOU", at, 1500, 1300, 1500, 0, 0, 0)
-        if step % 2 == 0:
-            log += _message("GPS", at, 0, 3, 14) + _message("GPA", at, 0, 0.8, 1.2)
     log += _message("ERR", _us(flown, until), 16, 2)
     return bytes(log)
 
@@ -155,12 +146,8 @@ _ULOG = {
     "battery_status": "uint64_t timestamp;float voltage_v;float current_a;uint8_t[4] _padding0;",
     "vehicle_attitude": "uint64_t timestamp;float[4] q;",
     "vehicle_attitude_setpoint": "uint64_t timestamp;float[4] q_d;",
-    "vehicle_local_position": (
-        "uint64_t timestamp;float x;float y;float z;float vx;float vy;float vz;"
-    ),
-    "vehicle_local_position_setpoint": "uint64_t timestamp;float x;float y;float z;",
+    "vehicle_local_position": "uint64_t timestamp;float vx;float vy;float vz;",
     "vehicle_imu_status": "uint64_t timestamp;float accel_vibration_metric;",
-    "vehicle_gps_position": "uint64_t timestamp;float eph;float epv;uint8_t satellites_used;",
     "actuator_motors": "uint64_t timestamp;float[12] control;",
 }
 
@@ -189,16 +176,12 @@ def ulog(
             (15.2, current),
             (turned[1], turned[0], 0.0, 0.0),
             (turned[1], 0.0, turned[0], 0.0),
-            (1.0, 2.0, -3.0, north, east, -up),
-            (1.5, 2.5, -3.5),
+            (north, east, -up),
             (4.5,),
-            (0.8, 1.2, 14),
             (0.5, 0.25, *[math.nan] * 10),
         )
         for number, row in enumerate(rows):
-            values = b"".join(
-                struct.pack("<B" if isinstance(one, int) else "<f", one) for one in row
-            )
+            values = struct.pack(f"<{len(row)}f", *row)
             log += _ulog("D", struct.pack("<HQ", number, _us(flown, now)) + values)
     warning = struct.pack("<BQ", ord("4"), _us(flown, until)) + b"Landing detected"
     return bytes(log + _ulog("L", warning))

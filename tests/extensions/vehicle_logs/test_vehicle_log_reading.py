@@ -45,11 +45,7 @@ def firsts(log: VehicleLog) -> dict[str, dict[str, float]]:
 
 COMMON = {
     "battery": {"voltage": 15.2, "current": 11.0},
-    "position": {"east": 2.0, "north": 1.0, "up": 3.0},
-    "position setpoint": {"east": 2.5, "north": 1.5, "up": 3.5},
     "velocity": {"east": 4.0, "north": 0.0, "up": 0.0},
-    "gps accuracy": {"horizontal": 0.8, "vertical": 1.2},
-    "gps satellites": {"satellites": 14.0},
 }
 
 
@@ -179,8 +175,8 @@ def described(kind: int, name: str, letters: str, columns: str) -> bytes:
         ("BAT", "ZffQ", "TimeUS,Volt,Curr,x"),
         ("BAT", "fff", "TimeUS,Volt,Curr"),
         ("BAT", "QZf", "TimeUS,Volt,Curr"),
-        ("GPS", "QZf", "TimeUS,I,NSats"),
-        ("GPS", "Qaf", "TimeUS,I,NSats"),
+        ("VIBE", "QZfff", "TimeUS,IMU,VibeX,VibeY,VibeZ"),
+        ("VIBE", "Qafff", "TimeUS,IMU,VibeX,VibeY,VibeZ"),
         ("MSG", "Qf", "TimeUS,Message"),
         ("PARM", "Qff", "TimeUS,Name,Value"),
         ("MSG", "", ""),

@@ -10,26 +10,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flown_logs import EPOCH, Flown, dataflash, record_flown, ulog
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 
 from aerodaas.cli.app import main
 from aerodaas.errors import AeroDaaSError, RecordingError
 from aerodaas.extensions.vehicle_logs.attaching import attach_file
 from aerodaas.extensions.vehicle_logs.attachment import (
-    AttachedLog,
     attach_log,
     attached_logs,
     flight_of,
 )
 from aerodaas.extensions.vehicle_logs.log import Series
-from aerodaas.extensions.vehicle_logs.plots import log_drawings
+from aerodaas.extensions.vehicle_logs.plots import log_drawing
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.page.figures import plots_of
 from aerodaas.recording.report.report import read_report, write_report
 
 FLOWN = Flown()
-PLOTS = ("battery", "attitude", "position", "gps", "vibration", "motors")
 
 
 @pytest.fixture
@@ -45,9 +43,16 @@ def written(folder: Path, name: str, content: bytes) -> Path:
     return file
 
 
-def figures(log: AttachedLog) -> dict[str, Figure]:
-    """The plots of a log by their topics."""
-    return {one.name.removeprefix("vehicle_log_1_"): one.draw() for one in log_drawings(1, log)}
+def drawn(recording: Path, **topics: Series | None) -> dict[str, Axes]:
+    """The rows of the attached log's plot by their labels, some topics replaced or removed."""
+    with Recording.open(recording) as opened:
+        (attached,) = attached_logs(opened)
+    assert attached.log is not None
+    changed = {**attached.log.topics, **{k.replace("_", " "): v for k, v in topics.items()}}
+    log = replace(attached.log, topics={k: v for k, v in changed.items() if v is not None})
+    drawing = log_drawing(1, replace(attached, log=log))
+    assert drawing is not None
+    return {axes.get_ylabel(): axes for axes in drawing.draw().axes}
 
 
 def test_an_attached_log_lies_over_its_flight(recording: Path, tmp_path: Path) -> None:
@@ -90,13 +95,12 @@ def test_what_is_refused_leaves_the_recording(recording: Path, tmp_path: Path) -
 
 
 def test_the_report_shows_its_topics(recording: Path, tmp_path: Path) -> None:
-    """One plot each, said to be from the autopilot's log; its messages at mission seconds."""
+    """In a plot said to be from the autopilot's log; its messages at mission seconds."""
     attach_log(recording, written(tmp_path, "own.bin", dataflash(FLOWN)))
     files = write_report(recording, tmp_path / "report")
-    names = [f"vehicle_log_1_{name}.png" for name in PLOTS]
-    assert [path.name for path in files.plots][-6:] == names
+    assert files.plots[-1].name == "vehicle_log_1.png"
     page = unescape(files.page.read_text())
-    assert page.count("From the autopilot's log: ") >= len(PLOTS)
+    assert "From the autopilot's log" in page
     assert "ERR of subsystem 16, code 2" in page
     assert "<th>60.0</th>" in page
     assert "own.bin of drone (ArduPilot) covers 0.0 to 60.0 s of the mission" in page
@@ -105,17 +109,19 @@ def test_the_report_shows_its_topics(recording: Path, tmp_path: Path) -> None:
 def test_lines_are_drawn_at_mission_seconds(recording: Path, tmp_path: Path) -> None:
     """Around the flight, in order, and setpoints beside what was flown."""
     attach_log(recording, written(tmp_path, "own.ulg", ulog(FLOWN)))
-    with Recording.open(recording) as opened:
-        (attached,) = attached_logs(opened)
-    made = figures(attached)
-    assert set(made) == set(PLOTS)
-    north = made["position"].axes[1].lines
-    assert [str(line.get_label()) for line in north] == ["estimated", "setpoint"]
-    assert [float(np.asarray(line.get_ydata())[0]) for line in north] == [1.0, 1.5]
-    time = np.asarray(north[0].get_xdata(), dtype=np.float64)
+    rows = drawn(recording)
+    angles = ["Roll (°)", "Pitch (°)", "Heading (°)"]
+    assert list(rows) == [
+        *("Voltage (V)", "Current (A)", *angles),
+        *("Vibration (m/s²)", "Motors (%)"),
+    ]
+    roll = rows["Roll (°)"].lines
+    assert [str(line.get_label()) for line in roll] == ["measured", "setpoint"]
+    assert [float(np.asarray(line.get_ydata())[0]) for line in roll] == pytest.approx([30.0, 0.0])
+    time = np.asarray(roll[0].get_xdata(), dtype=np.float64)
     assert (time[0], time[-1]) == pytest.approx((0.0, 59.9), abs=0.01)
     assert (np.diff(time) >= 0).all()
-    assert "PX4's log own.ulg" in made["battery"].axes[0].get_title(loc="left")
+    assert "PX4's log own.ulg" in rows["Voltage (V)"].get_title(loc="left")
 
 
 def test_a_line_is_in_order_within_the_flight_and_steps_at_north_are_none(
@@ -123,31 +129,23 @@ def test_a_line_is_in_order_within_the_flight_and_steps_at_north_are_none(
 ) -> None:
     """Whatever the order in the log, and however long it is."""
     attach_log(recording, written(tmp_path, "own.ulg", ulog(FLOWN)))
-    with Recording.open(recording) as opened:
-        (attached,) = attached_logs(opened)
-    assert attached.log is not None
     time = np.array([70.0, 62.0, 61.0, 60.0, 10.0, 300.0])
     heading = np.array([20.0, 5.0, 355.0, 350.0, 1.0, 2.0])
     angles = {"roll": heading, "pitch": heading, "heading": heading}
-    log = replace(attached.log, topics={"attitude": Series(time, angles)})
-    (made,) = figures(replace(attached, log=log)).values()
-    roll, _, shown = (np.asarray(axes.lines[0].get_ydata()) for axes in made.axes)
+    rows = drawn(recording, attitude=Series(time, angles), attitude_setpoint=None)
+    roll, shown = (
+        np.asarray(rows[label].lines[0].get_ydata()) for label in ("Roll (°)", "Heading (°)")
+    )
     assert roll.tolist() == [350.0, 355.0, 5.0, 20.0]
     assert np.array_equal(shown, [350.0, 355.0, np.nan, 5.0, 20.0], equal_nan=True)
 
 
 def test_what_was_not_measured_has_no_row(recording: Path, tmp_path: Path) -> None:
-    """A current of PX4's that is not known, and an axis without a setpoint."""
+    """A current of PX4's that is not known, and a log without motors."""
     attach_log(recording, written(tmp_path, "own.ulg", ulog(FLOWN, current=-1.0)))
-    with Recording.open(recording) as opened:
-        (attached,) = attached_logs(opened)
-    assert attached.log is not None
-    setpoint = attached.log.topics["position setpoint"]
-    north = Series(setpoint.time, {"north": setpoint.columns["north"]})
-    log = replace(attached.log, topics={**attached.log.topics, "position setpoint": north})
-    made = figures(replace(attached, log=log))
-    assert [axes.get_ylabel() for axes in made["battery"].axes] == ["Voltage (V)"]
-    assert [len(axes.lines) for axes in made["position"].axes] == [1, 2, 1]
+    rows = drawn(recording, motors=None)
+    assert {"Current (A)", "Motors (%)"}.isdisjoint(rows)
+    assert "Voltage (V)" in rows
 
 
 def test_a_log_that_cannot_be_shown_says_why(recording: Path, tmp_path: Path) -> None:
