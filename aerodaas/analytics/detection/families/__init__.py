@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from aerodaas.analytics.detection.families.base import ModelFamily
-from aerodaas.analytics.detection.families.end2end import end_to_end
+from aerodaas.analytics.detection.families.objectness import yolov5, yolox
 from aerodaas.analytics.detection.families.rtdetr import rtdetr
-from aerodaas.analytics.detection.families.ultralytics import ultralytics
-from aerodaas.analytics.detection.families.yolov5 import yolov5
-from aerodaas.analytics.detection.families.yolox import yolox
+from aerodaas.analytics.detection.families.ultralytics import end_to_end, ultralytics
 
 __all__ = ["FAMILIES"]
 

@@ -1,9 +1,12 @@
-"""Ultralytics' anchor-free heads as exported without NMS: v5u, v8, 11 and 26, detect and pose.
+"""Ultralytics' anchor-free heads, detect and pose: v5u, v8, 11 and 26 without NMS, and end to end.
 
-One output of shape [batch, 4 + classes + keypoints, anchors]: box centre, width and height in
-input pixels, class scores after the sigmoid, then keypoints (u, v and, with 3 numbers each, a
-confidence). Source: ultralytics/nn/modules/head.py, `Detect` and `Pose`, and
-ultralytics/engine/exporter.py for the metadata.
+Without NMS there is one output of shape [batch, 4 + classes + keypoints, anchors]: box centre,
+width and height in input pixels, class scores after the sigmoid, then keypoints (u, v and, with 3
+numbers each, a confidence). With NMS built in (`nms=True`) or not needed (YOLOv10 and 26), it has
+the shape [batch, detections, 6 + keypoints], at most a few hundred detections: left, top, right,
+bottom in input pixels, score, class, then keypoints; unused rows score zero. Source:
+ultralytics/nn/modules/head.py, `Detect`, `Pose` and `postprocess`, and
+ultralytics/engine/exporter.py, `NMSModel` and the metadata.
 """
 
 from __future__ import annotations
@@ -14,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.analytics.detection.families.arrays import best_class, corners
+from aerodaas.analytics.detection.coco import COCO_NAMES
+from aerodaas.analytics.detection.families.arrays import best_class, corners, listed
 from aerodaas.analytics.detection.families.base import (
     Candidates,
     Preprocessing,
@@ -23,10 +27,12 @@ from aerodaas.analytics.detection.families.base import (
 )
 from aerodaas.analytics.detection.model_file import ModelFile
 
-__all__ = ["UltralyticsDecoder", "keypoint_shape", "read_keypoints", "ultralytics"]
+__all__ = ["EndToEndDecoder", "UltralyticsDecoder", "end_to_end", "ultralytics"]
 
 _AXES = 3
 _BOX = 4
+_SCORE, _CLASS, _ROW = 4, 5, 6
+_MOST_DETECTIONS = 3000
 _PIXELS = Preprocessing()
 
 
@@ -55,7 +61,7 @@ class UltralyticsDecoder:
         raw = outputs[0]
         kept, scores, classes, invalid = best_class(raw[_BOX : _BOX + self.classes], min_score)
         rows = raw[:, kept].T
-        keypoints = read_keypoints(rows[:, _BOX + self.classes :], self.keypoints)
+        keypoints = _read_keypoints(rows[:, _BOX + self.classes :], self.keypoints)
         return keep_finite(Candidates(corners(rows[:, :_BOX]), scores, classes, keypoints, invalid))
 
 
@@ -65,7 +71,7 @@ def ultralytics(model: ModelFile) -> UltralyticsDecoder | None:
     if len(model.outputs) != 1 or len(shape) != _AXES:
         return None
     _, depth, anchors = shape
-    keypoints = keypoint_shape(model)
+    keypoints = _keypoint_shape(model)
     classes = depth - _BOX - (keypoints[0] * keypoints[1] if keypoints else 0)
     fits = classes == len(model.names) if model.names else strides_for(model.size, anchors)
     if not fits or classes < 1:
@@ -73,7 +79,48 @@ def ultralytics(model: ModelFile) -> UltralyticsDecoder | None:
     return UltralyticsDecoder(classes, keypoints)
 
 
-def keypoint_shape(model: ModelFile) -> tuple[int, int] | None:
+@dataclass(frozen=True)
+class EndToEndDecoder:
+    """Decodes [detections, 6 + keypoints]."""
+
+    classes: int
+    keypoints: tuple[int, int] | None = None
+    family: str = "Ultralytics end to end"
+    preprocessing: Preprocessing = _PIXELS
+    overlapping: bool = False
+
+    def decode(
+        self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
+    ) -> Candidates:
+        """Keep the rows with enough score and a valid class.
+
+        Args:
+            outputs: One array, N rows of box, score, class and keypoints.
+            size: Ignored.
+            min_score: Least score of a row.
+        """
+        del size
+        rows = outputs[0]
+        kept, scores, classes, invalid = listed(
+            rows[:, _SCORE], rows[:, _CLASS], self.classes, min_score
+        )
+        keypoints = _read_keypoints(rows[kept, _ROW:], self.keypoints)
+        return keep_finite(Candidates(rows[kept, :_SCORE], scores, classes, keypoints, invalid))
+
+
+def end_to_end(model: ModelFile) -> EndToEndDecoder | None:
+    """Recognise rows of six numbers, plus the keypoints declared in the metadata."""
+    shape = model.output_shape
+    keypoints = _keypoint_shape(model)
+    depth = _ROW + (keypoints[0] * keypoints[1] if keypoints else 0)
+    if len(model.outputs) != 1 or len(shape) != _AXES or shape[2] != depth:
+        return None
+    if shape[1] > _MOST_DETECTIONS:
+        return None
+    return EndToEndDecoder(len(model.names or COCO_NAMES), keypoints)
+
+
+def _keypoint_shape(model: ModelFile) -> tuple[int, int] | None:
     """Number of keypoints and of numbers for each (2 or 3), from the metadata of a pose model."""
     shape = model.literal("kpt_shape")
     pair = 2
@@ -82,18 +129,10 @@ def keypoint_shape(model: ModelFile) -> tuple[int, int] | None:
     return int(shape[0]), int(shape[1])
 
 
-def read_keypoints(
+def _read_keypoints(
     rows: NDArray[np.float32], shape: tuple[int, int] | None
 ) -> NDArray[np.float32] | None:
-    """Reshape rows of flat keypoints; a missing confidence counts as 1.
-
-    Args:
-        rows: N rows.
-        shape: Number of keypoints, and of numbers for each: 2 or 3; None without keypoints.
-
-    Returns:
-        Keypoints, N x K x 3, or None without.
-    """
+    """Keypoints of N rows, N x K x 3; a missing confidence counts as 1."""
     if shape is None:
         return None
     points = rows.reshape(len(rows), *shape)
