@@ -144,47 +144,6 @@ def test_every_kind_shows_the_same(tmp_path: Path, kind: str) -> None:
     source.close()
 
 
-def test_slow_reader_gets_the_newest(tmp_path: Path) -> None:
-    """Pictures that were overtaken are left out, and the last one is given once."""
-    path = tmp_path / "theirs.mcap"
-    write_ros(path, "compressed", [0.0, 0.1, 0.2, 0.3])
-    source = camera(path)
-    assert source.capture(0, None) is not None
-    newest = source.capture(SECOND, None)
-    assert newest is not None
-    assert np.abs(newest.image.astype(int) - picture(3)).max() <= 6
-    assert source.capture(2 * SECOND, None) is None
-
-
-def test_loop_begins_again(tmp_path: Path) -> None:
-    """A recording that loops never finishes."""
-    path = tmp_path / "theirs.mcap"
-    write_ros(path, "compressed", [0.0, 0.1])
-    source = camera(path, loop=True)
-    given = [source.capture(at * SECOND // 10, None) for at in range(20)]
-    assert sum(found is not None for found in given) > 10
-    assert not source.finished
-
-
-def test_broken_pictures_are_counted(tmp_path: Path) -> None:
-    """A picture that cannot be decoded is skipped; the next one is shown."""
-    path = tmp_path / "theirs.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start()
-        described = CompressedImage.get_schema()
-        schema = writer.register_schema(described.name, described.encoding, described.data)
-        channel = writer.register_channel("/image", "protobuf", schema)
-        for number, data in enumerate([jpeg(0), b"", b"no picture", jpeg(3)]):
-            message = CompressedImage(data=data, format="jpeg").encode()
-            writer.add_message(channel, number * SECOND, message, number * SECOND)
-        writer.finish()
-    source = camera(path)
-    given = [source.capture(at * SECOND, None) for at in range(4)]
-    assert [found is not None for found in given] == [True, False, False, True]
-    assert source.skipped == 2
-
-
 def test_which_camera_must_be_said(tmp_path: Path) -> None:
     """With two cameras, without any, or with a wrong topic, what there is is named."""
     path = tmp_path / "two.mcap"

@@ -160,22 +160,18 @@ def test_navigation_of_equal_waypoints_is_found() -> None:
     assert Waypoint("a", 1, 2, 3) in AeroNavigation(data=[Waypoint("a", 1.0, 2.0, 3.0)])
 
 
-def _copied(record: Any) -> Any:  # noqa: ANN401
-    return pickle.loads(pickle.dumps(record))  # noqa: S301 - our own bytes
-
-
 def test_equal_waypoints_are_unpickled_as_one() -> None:
     """A status that comes 20 times a second builds none of its waypoints anew."""
     here = Waypoint("here", 1.0, 2.0, 3.0)
-    assert _copied(here) is _copied(here)
-    assert _copied(replace(here, priority=1)).priority == 1
+    assert copied(here) is copied(here)
+    assert copied(replace(here, priority=1)).priority == 1
     whole = replace(here, x=1)
-    assert type(_copied(whole).x) is type(whole.x)
+    assert type(copied(whole).x) is type(whole.x)
 
 
 def test_a_derived_waypoint_keeps_its_class() -> None:
     """And what it holds beside."""
-    found = _copied(_Marked("here", 1.0, 2.0, 3.0, mark="x"))
+    found = copied(_Marked("here", 1.0, 2.0, 3.0, mark="x"))
     assert type(found) is _Marked
     assert found.mark == "x"
 
