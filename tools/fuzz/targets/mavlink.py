@@ -47,7 +47,16 @@ _ROBOT = RobotConfig.model_validate(
 )
 _OWN, _STRANGER = ("127.0.0.1", 14550), ("127.0.0.1", 6666)
 _GUIDED = 4
-_KINDS = sorted(link._WANTED)  # noqa: SLF001 - every message that the driver reads
+_VEHICLE = MavlinkVehicle(_ROBOT, EnvironmentConfig(robots=[_ROBOT]))
+_KINDS = sorted(
+    {
+        *(mavlink.MAVLINK_MSG_ID_PARAM_VALUE, mavlink.MAVLINK_MSG_ID_MISSION_COUNT),
+        mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT,
+        *(link._MESSAGE_IDS[name] for name in _VEHICLE._telemetry.messages),  # noqa: SLF001
+        *(link._MESSAGE_IDS[name] for name in _VEHICLE._handlers),  # noqa: SLF001
+    }
+)
+"""Every message that the driver reads, those of its transfers included."""
 _LONGEST_BODY = 600
 _BYTES, _MESSAGE, _FORGED, _OTHER = range(4)
 """Bytes as they are; a message of the vehicle, of a stranger, of another system: kind, payload."""
