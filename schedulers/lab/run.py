@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager, nullcontext
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -135,26 +135,6 @@ class LabResult:
             "edge use": [s.edge_busy / busy for s in scores],
             "cloud use": [s.cloud_busy / busy for s in scores],
             "cost per s": [s.cost / seconds for s in scores],
-        }
-
-    def as_json(self) -> dict[str, Any]:
-        """Everything, for a file: means with half widths of 95 % intervals, and raw scores."""
-        return {
-            "workload": self.workload.name,
-            "duration_s": self.workload.duration / 1e9,
-            "drones": self.workload.drones,
-            "edges": self.workload.edges,
-            "network": self.network.name,
-            "times": self.times.name,
-            "seeds": list(self.seeds),
-            "bounds": self.bounds,
-            "schedulers": {
-                name: {
-                    "means": {key: asdict(mean) for key, mean in self.figures(name).items()},
-                    "scores": [asdict(one) for one in self.scores[name]],
-                }
-                for name in self.scores
-            },
         }
 
 

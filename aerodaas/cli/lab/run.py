@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import random
 from math import isnan
 from pathlib import Path
@@ -89,11 +88,9 @@ def run(
     ] = None,
     jobs: Jobs = None,
     plots: Annotated[Path | None, typer.Option(help="Folder for plots.")] = None,
-    json_path: Annotated[
-        Path | None, typer.Option("--json", help="File for every figure and its interval.")
-    ] = None,
     csv_path: Annotated[
-        Path | None, typer.Option("--csv", help="The same, one figure to a row.")
+        Path | None,
+        typer.Option("--csv", help="File for every figure and its interval, one to a row."),
     ] = None,
 ) -> None:
     """Simulate schedulers on the same sample paths and compare them.
@@ -133,8 +130,6 @@ def run(
         _show(result)
         if plots is not None:
             _plot(result, names, resources, plots)
-    if json_path is not None:
-        json_path.write_text(json.dumps([r.as_json() for r in results], indent=1))
     if csv_path is not None:
         write_csv(csv_path, [row for result in results for row in _tidy_rows(result)])
 
