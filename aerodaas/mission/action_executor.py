@@ -115,7 +115,7 @@ class ActionExecutor:
         return False
 
     def ongoing(self) -> str:
-        """What goes on between waypoints by our setpoints, as a clause; empty for nothing."""
+        """Return the action that goes on between waypoints, as a clause; empty for none."""
         return ""
 
     def interruption(self) -> tuple[MissionState, str] | None:
@@ -170,6 +170,7 @@ class ActionRunner(ActionExecutor):
         """Call `executors`; what one raises is an alert in `log`, and its action is over."""
         self._executors = executors
         self._log = log
+        self._now = 0
 
     def handle(self, command: Command, state: MissionState, now: int) -> Answer | None:
         """The first answer; None if no executor knows the command."""
@@ -177,6 +178,7 @@ class ActionRunner(ActionExecutor):
 
     def poll(self, now: int) -> None:
         """Poll each."""
+        self._now = now
         for executor in self._executors:
             self._call(executor.poll, now)
 
@@ -192,19 +194,19 @@ class ActionRunner(ActionExecutor):
 
     def stops_at(self, stop: QueuedWaypoint, following: QueuedWaypoint, radius: float) -> bool:
         """Whether the drone has to stop for one."""
-        return any(executor.stops_at(stop, following, radius) for executor in self._executors)
+        return any(self._call(one.stops_at, stop, following, radius) for one in self._executors)
 
     def ongoing(self) -> str:
         """The first that goes on; empty for none."""
-        return _first(executor.ongoing() for executor in self._executors) or ""
+        return _first(self._call(executor.ongoing) for executor in self._executors) or ""
 
     def interruption(self) -> tuple[MissionState, str] | None:
         """The first."""
-        return _first(executor.interruption() for executor in self._executors)
+        return _first(self._call(executor.interruption) for executor in self._executors)
 
     def ending(self) -> tuple[MissionState, str] | None:
         """The first."""
-        return _first(executor.ending() for executor in self._executors)
+        return _first(self._call(executor.ending) for executor in self._executors)
 
     def on_state(self, state: MissionState, now: int) -> None:
         """Inform each."""
@@ -212,9 +214,10 @@ class ActionRunner(ActionExecutor):
             self._call(executor.on_state, state, now)
 
     def _call(self, method: Callable[..., Any], *arguments: Any) -> Any:  # noqa: ANN401 - any of its
-        """Call a method of an executor, whose last argument is the mission clock."""
+        """Call a method of an executor; None where it raises."""
         try:
             return method(*arguments)
         except Exception as error:  # noqa: BLE001 - an extension must not end a flight
             text = f"{method.__qualname__}: {failure_line(error)}"
-            self._log.alert(arguments[-1], "action", text)
+            self._log.alert(self._now, "action", text)
+            return None

@@ -23,6 +23,7 @@ from aerodaas.config.model import validated
 from aerodaas.config.plugins import load_plugin, plugin_names
 from aerodaas.config.schema import environment_schema
 from aerodaas.errors import ConfigError, InvalidWaypointError, UnknownIdError
+from aerodaas.messages.mission import MissionState
 from aerodaas.testing.extension_kit import check_extension
 
 _ROOT = Path(__file__).resolve().parents[2]
@@ -153,14 +154,28 @@ class Sprayer(ActionExecutor):
             self.done.append(stop.id)
         return False
 
+class Pump(ActionExecutor):
+    order = 9
+    def __init__(self, vehicle, robot, log):
+        pass
+    def fail(self, *arguments):
+        raise RuntimeError("the pump is broken")
+    poll = attend = steer = stops_at = ongoing = interruption = ending = on_state = fail
+
 EXTENSION = Extension(
-    "spraying", "Sprays.", actions=("spraying:Spray",), action_executors=("spraying:Sprayer",)
+    "spraying",
+    "Sprays.",
+    actions=("spraying:Spray",),
+    action_executors=("spraying:Sprayer", "spraying:Pump"),
 )
 """
 
 
 def test_a_packages_extension_adds_an_action(site: Path) -> None:
-    """A waypoint has it in JSON, and the drone stays until its executor is done; or flies on."""
+    """A waypoint has it in JSON, and the drone stays until its executor is done.
+
+    It flies on where an executor fails, and lands at the end.
+    """
     _install(site, "spraying", "spraying", SPRAYING)
     spraying = importlib.import_module("spraying")
     check_extension(spraying.EXTENSION)
@@ -175,11 +190,13 @@ def test_a_packages_extension_adds_an_action(site: Path) -> None:
         spraying.Spray(-1.0)
     made = flight(add(*stops))
     made.run(until=lambda: made.mission.finished)
+    assert made.status.state is MissionState.LANDED
     assert spraying.Sprayer.done == ["field"]
     assert tuple(made.status.visited) == ("field", "blocked")
     texts = [alert.text for alert in made.mission.alerts]
     assert any("Sprayer.attend" in text and "the nozzle is blocked" in text for text in texts)
     assert any("the tank holds 5 litres" in text for text in texts)
+    assert any("the pump is broken" in text for text in texts)
 
 
 @pytest.mark.parametrize("source", ["import nothing_of_this_name\n", "EXTENSION = 3\n"])
