@@ -14,10 +14,7 @@ from surveyors import patience
 from aerodaas.clock import NANOSECONDS, SimulatedClock
 from aerodaas.config.model import LimitsConfig
 from aerodaas.config.sections.preflight import PreflightConfig
-from aerodaas.drivers.mavlink.payload.camera_status import (
-    camera_model_told,
-    capture_status,
-)
+from aerodaas.drivers.mavlink.payload.camera_status import with_capture, with_model
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
 from aerodaas.messages.health import HealthItem, Verdict
@@ -167,7 +164,7 @@ def test_no_status_is_too_odd(
     message = mavlink.MAVLink_camera_capture_status_message(
         0, image, video, interval, 1500, free, count
     )
-    status = capture_status(message)
+    status = with_capture(CameraStatus("camera"), message)
     for value in (status.taken, status.interval, status.recording, status.free):
         assert value is None or 0.0 <= value < math.inf
     assert (status.recording == 1.5) == (video == 1)
@@ -185,11 +182,11 @@ def test_no_camera_is_too_odd(names: list[int], focal: float, sensor: float, pix
     message = mavlink.MAVLink_camera_information_message(
         0, names, names, 0, focal, sensor, 1.0, pixels, 10, 0, 0, 0, b""
     )
-    model = camera_model_told(message)
-    assert model.name.isascii()
-    assert model.name.isprintable()
-    assert model.view is None or 0.0 < model.view < 180.0
-    assert (model.pixels is None) == (pixels == 0)
+    known = with_model(CameraStatus("camera"), message)
+    assert known.model.isascii()
+    assert known.model.isprintable()
+    assert known.view is None or 0.0 < known.view < 180.0
+    assert (known.pixels is None) == (pixels == 0)
 
 
 ABLE = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE | mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_ZOOM

@@ -19,12 +19,12 @@ from aerodaas.drivers.mavlink.microservices.commander import (
     CommandResult,
     PendingCommand,
 )
-from aerodaas.drivers.mavlink.payload.camera_status import CaptureStatus
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.errors import VehicleError
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.payload import (
+    CameraStatus,
     GimbalAttitude,
     LensTarget,
     Photo,
@@ -112,7 +112,7 @@ class MavlinkRecorder:
     def _expect(self, now: float, *, on: bool) -> None:
         self._acknowledged, self._confirmed = (on, now), False
 
-    def heed(self, status: CaptureStatus, now: float) -> None:
+    def heed(self, status: CameraStatus, now: float) -> None:
         """Compare with what the camera says that it does.
 
         Args:
@@ -312,7 +312,7 @@ class MavlinkCamera:
         """Whether the camera took on a picture a while ago, and does not tell of it."""
         return self._request is not None and now - self._request.begun_at >= _OVERDUE
 
-    def compare(self, status: CaptureStatus, now: float) -> None:
+    def compare(self, status: CameraStatus, now: float) -> None:
         """Take an overdue picture for taken where the camera's own count has gone up for it.
 
         Args:
@@ -320,6 +320,8 @@ class MavlinkCamera:
             now: Monotonic clock, seconds.
         """
         request = self._request
+        if status.taken is None:
+            return
         self._taken = status.taken
         # Its count begins anew with a formatted card.
         self._settled = min(self._settled, status.taken)

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from urllib.parse import urlsplit
 
 from aerodaas.config.secrets import shown_text
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
+from aerodaas.messages.payload import CameraStatus
 
 __all__ = [
     "SCHEMES",
-    "CameraModelTold",
-    "CaptureStatus",
-    "CardState",
     "VideoStream",
-    "camera_model_told",
-    "capture_status",
-    "card_state",
     "video_stream",
+    "with_capture",
+    "with_card",
+    "with_model",
 ]
 
 _FULL = 64.0
@@ -30,24 +28,15 @@ _TROUBLES = {
 }
 
 
-@dataclass(frozen=True)
-class CardState:
-    """State of a camera's memory card, as the camera tells it."""
-
-    free: float | None
-    """MiB; None where it is not told."""
-    trouble: str = ""
-    """Why it keeps no pictures, or soon will not; empty if it does."""
-
-
-def card_state(message: Message) -> CardState:
-    """Read a STORAGE_INFORMATION, whatever it holds."""
-    status, free = int(message.status), float(message.available_capacity)
-    known = status == mavlink.STORAGE_STATUS_READY and math.isfinite(free) and free >= 0.0
-    room = free if known else None
-    if room is not None and room < _FULL:
-        return CardState(room, f"its card is full: {room:.0f} MiB are left")
-    return CardState(room, _TROUBLES.get(status, ""))
+def with_card(status: CameraStatus, message: Message) -> CameraStatus:
+    """`status` with a STORAGE_INFORMATION, whatever it holds."""
+    state, free = int(message.status), float(message.available_capacity)
+    known = state == mavlink.STORAGE_STATUS_READY and math.isfinite(free) and free >= 0.0
+    if known and free < _FULL:
+        trouble = f"its card is full: {free:.0f} MiB are left"
+    else:
+        trouble = _TROUBLES.get(state, "")
+    return replace(status, free=free if known else None, trouble=trouble)
 
 
 _BY_INTERVAL = frozenset({2, 3})
@@ -59,51 +48,28 @@ _WIDEST = 179.0
 """Degrees; a pinhole camera sees less."""
 
 
-@dataclass(frozen=True, slots=True)
-class CameraModelTold:
-    """Model of a camera, as it tells it."""
-
-    name: str
-    """Vendor and model; empty where neither is told."""
-    pixels: tuple[int, int] | None
-    """Width and height of its pictures; None where they are not told."""
-    view: float | None
-    """Degrees across its picture; None where lens or sensor are not told."""
-
-
-@dataclass(frozen=True, slots=True)
-class CaptureStatus:
-    """Activity of a camera: pictures taken, video, free storage."""
-
-    taken: int
-    """Pictures that it ever took, by its own count."""
-    interval: float | None
-    """Seconds between pictures that it takes by itself; None while it takes none."""
-    recording: float | None
-    """Seconds for which it has been recording video; None while it records none."""
-    free: float | None
-    """MiB; None where it is not told."""
-
-
-def camera_model_told(message: Message) -> CameraModelTold:
-    """Read a CAMERA_INFORMATION, whatever it holds."""
+def with_model(status: CameraStatus, message: Message) -> CameraStatus:
+    """`status` with a CAMERA_INFORMATION, whatever it holds."""
     names = [_text(message.vendor_name), _text(message.model_name)]
     width, height = int(message.resolution_h), int(message.resolution_v)
-    return CameraModelTold(
-        " ".join(dict.fromkeys(name for name in names if name)),
-        (width, height) if width and height else None,
-        _view(float(message.focal_length), float(message.sensor_size_h)),
+    return replace(
+        status,
+        model=" ".join(dict.fromkeys(name for name in names if name)),
+        pixels=(width, height) if width and height else None,
+        view=_view(float(message.focal_length), float(message.sensor_size_h)),
     )
 
 
-def capture_status(message: Message) -> CaptureStatus:
-    """Read a CAMERA_CAPTURE_STATUS, whatever it holds."""
+def with_capture(status: CameraStatus, message: Message) -> CameraStatus:
+    """`status` with a CAMERA_CAPTURE_STATUS, whatever it holds."""
     interval, free = float(message.image_interval), float(message.available_capacity)
-    return CaptureStatus(
-        max(0, int(message.image_count)),
-        _positive(interval) if int(message.image_status) in _BY_INTERVAL else None,
-        message.recording_time_ms / 1e3 if int(message.video_status) == _RECORDING else None,
-        free if math.isfinite(free) and free > 0.0 else None,
+    records = int(message.video_status) == _RECORDING
+    return replace(
+        status,
+        taken=max(0, int(message.image_count)),
+        interval=_positive(interval) if int(message.image_status) in _BY_INTERVAL else None,
+        recording=message.recording_time_ms / 1e3 if records else None,
+        free=free if status.free is None and 0.0 < free < math.inf else status.free,
     )
 
 

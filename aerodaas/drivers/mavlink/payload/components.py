@@ -22,14 +22,11 @@ from aerodaas.drivers.mavlink.payload.camera import (
     Moment,
 )
 from aerodaas.drivers.mavlink.payload.camera_status import (
-    CameraModelTold,
-    CaptureStatus,
-    CardState,
     VideoStream,
-    camera_model_told,
-    capture_status,
-    card_state,
     video_stream,
+    with_capture,
+    with_card,
+    with_model,
 )
 from aerodaas.drivers.mavlink.payload.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
@@ -124,10 +121,8 @@ class PayloadComponent:
         self.camera: MavlinkCamera | None = None
         self.streams: dict[int, VideoStream] = {}
         """Of its video, by number; the first word of each counts."""
-        self.card: CardState | None = None
-        """What its camera said of its card; None before."""
-        self._model: CameraModelTold | None = None
-        self._capture: CaptureStatus | None = None
+        self.status: CameraStatus | None = None
+        """Of its camera; None until it is known, and without a camera."""
         self._card_at = self._capture_at = -math.inf
         self.commander = commander
         self._moment = moment
@@ -200,15 +195,17 @@ class PayloadComponent:
             self._inform(message)
         elif kind == "VIDEO_STREAM_INFORMATION" and len(self.streams) < _MOST_STREAMS:
             self.streams.setdefault(int(message.stream_id), video_stream(message))
+        elif self.status is None:
+            return
         elif kind == "STORAGE_INFORMATION":
-            self.card, self._card_at = card_state(message), now
+            self.status, self._card_at = with_card(self.status, message), now
             self._answered(_STORAGE)
         elif kind == "CAMERA_CAPTURE_STATUS":
-            self._capture, self._capture_at = capture_status(message), now
+            self.status, self._capture_at = with_capture(self.status, message), now
             self._answered(_CAPTURE)
             if self.camera is not None:
-                self.camera.compare(self._capture, now)
-                self.camera.recorder.heed(self._capture, now)
+                self.camera.compare(self.status, now)
+                self.camera.recorder.heed(self.status, now)
 
     def _answered(self, message: int) -> None:
         """Ask for it again later: it changes."""
@@ -217,7 +214,7 @@ class PayloadComponent:
 
     def _inform(self, information: Message) -> None:
         self._informed, flags = True, int(information.flags)
-        self._model = camera_model_told(information)
+        self.status = with_model(self.status or CameraStatus(self.name), information)
         if self.camera is None and _takes_pictures(information):
             lens = MavlinkLens(self.commander, flags)
             recorder = MavlinkRecorder(self.commander, flags)
@@ -227,25 +224,6 @@ class PayloadComponent:
         for message in [*wanted, _VIDEO] if films else wanted:
             if all(search.message != message for search in self._searches):
                 self._searches.append(_Search(message))
-
-    @property
-    def status(self) -> CameraStatus | None:
-        """Status of its camera; None until it is known, and without a camera."""
-        model, card, capture = self._model, self.card, self._capture
-        if model is None:
-            return None
-        told = None if card is None else card.free
-        return CameraStatus(
-            self.name,
-            model.name,
-            model.pixels,
-            model.view,
-            free=told if told is not None or capture is None else capture.free,
-            trouble="" if card is None else card.trouble,
-            taken=None if capture is None else capture.taken,
-            interval=None if capture is None else capture.interval,
-            recording=None if capture is None else capture.recording,
-        )
 
     def _knows(self, message: int, now: float) -> bool:
         """Whether what a search is for has been found."""

@@ -172,9 +172,9 @@ class Payload:
             f"{one.name}: no word from it any more" for one in self._own.values() if one.gone(now)
         ]
         faults += [
-            f"{one.name}: {one.card.trouble}"
+            f"{one.name}: {one.status.trouble}"
             for one in self._ranked()
-            if one.card is not None and one.card.trouble and not one.gone(now)
+            if one.status is not None and one.status.trouble and not one.gone(now)
         ]
         attitude, video = self._attitude(), self._video()
         if attitude is None and not faults and not video:
