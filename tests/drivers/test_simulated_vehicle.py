@@ -17,7 +17,6 @@ from aerodaas.errors import ClockError, ConfigError, InvalidWaypointError, Vehic
 from aerodaas.messages.vehicle import (
     FlightEnd,
     PositionSetpoint,
-    SteppedVehicle,
     VehicleMode,
     VehicleState,
     VelocitySetpoint,
@@ -59,11 +58,6 @@ class Flight:
         self.vehicle.take_off(height)
         self.until(VehicleMode.HOLDING)
         return self
-
-
-def test_it_is_a_stepped_vehicle() -> None:
-    """The protocol's every method is there."""
-    assert isinstance(Flight().vehicle, SteppedVehicle)
 
 
 def test_a_flight_from_the_ground_and_back() -> None:

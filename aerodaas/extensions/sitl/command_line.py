@@ -59,9 +59,6 @@ Port: TypeAlias = Annotated[
     int | None,
     typer.Option(min=1024, max=65535, help="UDP port for its vehicle. Default: 14540 + instance."),
 ]
-System: TypeAlias = Annotated[
-    int | None, typer.Option(min=1, max=255, help="Its system id. Default: its parameters'.")
-]
 Defaults: TypeAlias = Annotated[
     list[Path] | None, typer.Option(help="A file of parameters, over the program's own.")
 ]
@@ -80,7 +77,6 @@ def ardupilot(
     speed: Speed = 1.0,
     instance: Instance = 0,
     port: Port = None,
-    system: System = None,
     defaults: Defaults = None,
     run: Run = None,
     robot: RobotId = "drone",
@@ -104,7 +100,6 @@ def ardupilot(
                 "speed": speed,
                 "instance": instance,
                 "port": port,
-                "system": system,
                 "defaults": [one.resolve() for one in _files(defaults)],
             },
             run,
@@ -162,10 +157,7 @@ def _print_instructions(simulator: SitlProcess, robot: str) -> None:
 
 def _settings(simulator: SitlProcess, robot: str) -> list[str]:
     """Options of `aerodaas run` by which a robot is the simulated vehicle."""
-    told = ["driver=mavlink", f"url={simulator.url}"]
-    if simulator.system is not None:
-        told.append(f"system={simulator.system}")
-    return [word for one in told for word in ("--set", f"{robot}.{one}")]
+    return ["--set", f"{robot}.driver=mavlink", "--set", f"{robot}.url={simulator.url}"]
 
 
 def _flown(simulator: SitlProcess, words: Sequence[str]) -> int:

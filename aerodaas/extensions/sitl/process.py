@@ -58,8 +58,6 @@ class SitlOptions:
     port: int | None = None
     """UDP port of this machine at which its vehicle is to be heard; None: 14540 and the instance.
     """
-    system: int | None = None
-    """Its system id; None: the program's own."""
     defaults: Sequence[Path] = ()
     """Files of parameters, the later ones over the earlier."""
 
@@ -88,8 +86,6 @@ def _px4(options: SitlOptions) -> SitlProgram:
     )
     if options.port not in {None, _FIRST_PORT + options.instance}:
         raise SourceError("px4 speaks to port 14540 and its instance: give --instance, no --port")
-    if options.system is not None:
-        raise SourceError("px4 has its instance and one as its system id: give --instance")
     if options.defaults:
         raise SourceError("px4 takes no file of parameters here: set them by PX4_PARAM_NAME=value")
     if options.home.heading:
@@ -130,8 +126,6 @@ def _ardupilot(options: SitlOptions) -> SitlProgram:
         # By default it listens on every interface of the machine.
         *("--serial0", f"udpclient:{host}:{port}", "--serial1", "none", "--serial2", "none"),
     ]
-    if options.system is not None:
-        command += ["--sysid", str(options.system)]
     return SitlProgram(command, {})
 
 
@@ -195,8 +189,6 @@ class SitlProcess:
         """What it prints."""
         self.url = "udpin:{}:{}".format(*options.heard_at)
         """Of the vehicle, for the setting `url` of the driver `mavlink`."""
-        self.system = options.system
-        """Its system id, if one was asked for."""
         self._options = options
         self._timeout = timeout
         self._process: subprocess.Popen[bytes] | None = None

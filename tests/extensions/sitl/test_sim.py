@@ -187,9 +187,6 @@ def test_a_bare_arducopter_needs_parameters(tmp_path: Path) -> None:
         PROGRAMS["ardupilot"](SitlOptions(tmp_path, program))
     made = PROGRAMS["ardupilot"](SitlOptions(tmp_path, program, defaults=[Path("mine.parm")]))
     assert "mine.parm" in made.command
-    assert "--sysid" not in made.command
-    made = PROGRAMS["ardupilot"](SitlOptions(tmp_path, program, system=2, defaults=[Path("m")]))
-    assert made.command[-2:] == ["--sysid", "2"]
 
 
 def test_px4_is_its_build_with_sih(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

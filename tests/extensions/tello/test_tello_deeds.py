@@ -18,7 +18,13 @@ from aerodaas.extensions.tello.commands import STILL, Command, Sticks
 from aerodaas.extensions.tello.link import LinkCounts
 from aerodaas.extensions.tello.state import TelloState
 from aerodaas.extensions.tello.vehicle import TelloVehicle
-from aerodaas.messages.vehicle import FlightEnd, PositionSetpoint, VehicleMode, VelocitySetpoint
+from aerodaas.messages.vehicle import (
+    FlightEnd,
+    PositionSetpoint,
+    Setpoint,
+    VehicleMode,
+    VelocitySetpoint,
+)
 
 STANDING = TelloState(0.0, 0.0, 0.0, (0.0, 0.0, 0.0), 0.0, 0.1, 100.0, 80, 0.0, 50.0)
 SPEEDS = {"full_speed": 2.0, "full_climb": 1.0, "full_turn": 100.0}
@@ -235,6 +241,23 @@ def test_a_velocity_by_its_sticks(
     assert sent.yaw_rate == pytest.approx(math.copysign(math.radians(50), rate) if rate else 0.0)
     assert world.steered[-1] == sticks
     assert world.mode() is VehicleMode.GUIDED
+
+
+@pytest.mark.parametrize(
+    "nonsense",
+    [
+        VelocitySetpoint(np.array([math.nan, 0.0, 0.0])),
+        PositionSetpoint(np.array([0.0, math.inf, 1.0])),
+        PositionSetpoint(np.zeros(3), yaw=math.nan),
+        PositionSetpoint(np.zeros(3), speed=-1.0),
+    ],
+)
+def test_nonsense_is_not_steered(world: World, nonsense: Setpoint) -> None:
+    """Figures that are none never reach the wire."""
+    world.fly()
+    with pytest.raises(InvalidWaypointError):
+        world.vehicle.send(nonsense)
+    assert world.steered == []
 
 
 def test_where_it_looks_turns_its_sticks(world: World) -> None:
