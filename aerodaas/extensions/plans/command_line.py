@@ -15,7 +15,6 @@ from aerodaas.extensions.payload.actions import (
     AimGimbal,
     LookAt,
     RecordVideo,
-    SetLens,
     TakePhoto,
     TriggerPhotos,
 )
@@ -90,9 +89,6 @@ def _pictures(waypoint: Waypoint) -> str:
             case AimGimbal(pitch=pitch, yaw=yaw):
                 pitch, yaw = math.degrees(pitch), math.degrees(yaw)
                 said.append(f", gimbal at pitch {pitch:.0f}, yaw {yaw:.0f} degrees")
-            case SetLens(zoom=zoom, focus=focus):
-                named = (("zoom", zoom), ("focus", focus))
-                said += [f", {name} at {value:g} %" for name, value in named if value is not None]
             case TakePhoto():
                 said.append(", a picture")
             case RecordVideo(on=on):

@@ -14,13 +14,10 @@ __all__ = [
     "FRAME_RELATIVE",
     "MOUNT_MAVLINK_TARGETING",
     "MOUNT_NEUTRAL",
-    "OF_RANGE",
     "command_name",
     "why_not",
 ]
 
-OF_RANGE = 2.0
-"""CAMERA_ZOOM_TYPE and SET_FOCUS_TYPE of percent of the lens's range."""
 MOUNT_NEUTRAL = 1
 MOUNT_MAVLINK_TARGETING = 2
 """MAV_MOUNT_MODE of angles."""
@@ -37,6 +34,7 @@ FRAMES_ABOVE_GROUND = (FRAME_ABOVE_GROUND, 11)
 _CAMERA = "no picture is taken by it; the application's camera streams all the way"
 _GIMBAL = "no gimbal is moved by it; it stays as it is"
 _PAYLOAD = "no payload is moved"
+_LENS = "the lens stays as it is; give the waypoints zoom and focus"
 _WHY = {
     112: "the next command does not wait",  # CONDITION_DELAY
     113: "the next command does not wait",  # CONDITION_CHANGE_ALT
@@ -58,6 +56,8 @@ _WHY = {
     208: _PAYLOAD,  # DO_PARACHUTE
     211: _PAYLOAD,  # DO_GRIPPER
     530: _CAMERA,  # SET_CAMERA_MODE
+    531: _LENS,  # SET_CAMERA_ZOOM
+    532: _LENS,  # SET_CAMERA_FOCUS
     1001: _GIMBAL,  # DO_GIMBAL_MANAGER_CONFIGURE
 }
 

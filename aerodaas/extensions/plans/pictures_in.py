@@ -1,9 +1,9 @@
-"""Pictures, video, gimbal, lens and region of interest of a plan's items, as waypoints have them.
+"""Pictures, video, gimbal and region of interest of a plan's items, as waypoints have them.
 
 A plan says what goes on from an item; a waypoint says what is done on the way to it and there. So
 what begins at an item is given to the waypoints behind it; a single picture is the waypoint's
-before it, and so is a turn of the gimbal, or of the lens, that comes before pictures there, and
-the beginning or end of a video.
+before it, and so is a turn of the gimbal that comes before pictures there, and the beginning or end
+of a video.
 """
 
 from __future__ import annotations
@@ -21,14 +21,12 @@ from aerodaas.extensions.payload.actions import (
     AimGimbal,
     LookAt,
     RecordVideo,
-    SetLens,
     TakePhoto,
     TriggerPhotos,
 )
 from aerodaas.extensions.plans.commands import (
     MOUNT_MAVLINK_TARGETING,
     MOUNT_NEUTRAL,
-    OF_RANGE,
     why_not,
 )
 from aerodaas.extensions.plans.formats.numbers import LatLon, place
@@ -47,8 +45,6 @@ _SHOOT = 1
 """DO_DIGICAM_CONTROL: take a picture."""
 _YAW_LOCK = 16
 """GIMBAL_MANAGER_FLAGS_YAW_LOCK: yaw counts from north."""
-_WHOLE = 100.0
-"""Percent."""
 _NOBODY = "no waypoint comes after it"
 _NOT_HERE = "no waypoint comes before it"
 
@@ -101,8 +97,6 @@ class PictureItems:
         """Item that began pictures which no waypoint has had yet."""
         self._aim: _Aim | None = None
         """What no waypoint has had yet."""
-        self._lens: dict[str, tuple[PlanItem, float]] = {}
-        """Percent of `zoom` and `focus` that no waypoint has had yet, with their items."""
         self._angles = (0.0, 0.0)
         self._looks = False
         self.commands: dict[int, Callable[[PlanItem, list[Waypoint]], str]] = {
@@ -116,8 +110,6 @@ class PictureItems:
             mavlink.MAV_CMD_DO_SET_ROI: self._region,
             mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self._look_at,
             mavlink.MAV_CMD_DO_SET_ROI_NONE: self._look_away,
-            mavlink.MAV_CMD_SET_CAMERA_ZOOM: partial(self._set_lens, "zoom"),
-            mavlink.MAV_CMD_SET_CAMERA_FOCUS: partial(self._set_lens, "focus"),
             mavlink.MAV_CMD_VIDEO_START_CAPTURE: partial(self._film, on=True),
             mavlink.MAV_CMD_VIDEO_STOP_CAPTURE: partial(self._film, on=False),
         }
@@ -141,9 +133,9 @@ class PictureItems:
     def given(self, waypoint: Waypoint) -> tuple[Waypoint, list[tuple[PlanItem, str]]]:
         """A new waypoint, with what items before it say, and what it cannot have."""
         self._begun = None
-        dressed = self._with_lens(waypoint)
+        dressed = waypoint
         if self._distance or self._interval:
-            dressed = dressed.with_actions(TriggerPhotos(self._distance, self._interval))
+            dressed = waypoint.with_actions(TriggerPhotos(self._distance, self._interval))
         aim, self._aim = self._aim, None
         if aim is None:
             return dressed, []
@@ -154,8 +146,7 @@ class PictureItems:
 
     def left(self) -> Iterator[tuple[PlanItem, str]]:
         """Items whose word no waypoint has had."""
-        waiting = [self._begun, None if self._aim is None else self._aim.item]
-        waiting += [item for item, _ in self._lens.values()]
+        waiting = (self._begun, None if self._aim is None else self._aim.item)
         yield from ((item, _NOBODY) for item in waiting if item is not None)
 
     def _by_distance(self, item: PlanItem, waypoints: list[Waypoint]) -> str:
@@ -208,44 +199,15 @@ class PictureItems:
         return ""
 
     def _aim_here(self, waypoints: list[Waypoint]) -> None:
-        """Give a pending aim and lens to the waypoint before, where pictures are taken now."""
-        if not waypoints or waypoints[-1].action(TakePhoto):
+        """Give a pending aim to the waypoint before, where pictures are taken now."""
+        aim = self._aim
+        if aim is None or not waypoints:
             return
-        self._set_lens_here(waypoints)
-        aim, last = self._aim, waypoints[-1]
-        if aim is None or last.action(AimGimbal) or last.action(LookAt):
+        last = waypoints[-1]
+        if any(last.action(kind) for kind in (TakePhoto, AimGimbal, LookAt)):
             return
         waypoints[-1] = aim.at(last)
         self._aim = None
-
-    def _with_lens(self, waypoint: Waypoint) -> Waypoint:
-        """`waypoint`, with the pending zoom and focus."""
-        lens = {name: percent for name, (_, percent) in self._lens.items()}
-        self._lens.clear()
-        before = waypoint.action(SetLens) or SetLens()
-        return waypoint.with_actions(replace(before, **lens)) if lens else waypoint
-
-    def _set_lens_here(self, waypoints: list[Waypoint]) -> None:
-        """Give a pending zoom and focus to the waypoint before."""
-        last = waypoints[-1]
-        lens = last.action(SetLens) or SetLens()
-        items = [item for name, (item, _) in self._lens.items() if getattr(lens, name) is not None]
-        if items:
-            # Both are set, one on the way there, one at a waypoint of its own in the same place.
-            waypoints.append(same_place(last, items[0]))
-        waypoints[-1] = self._with_lens(waypoints[-1])
-
-    def _set_lens(self, name: str, item: PlanItem, _: list[Waypoint]) -> str:
-        """Set `zoom` or `focus` on the way to the next waypoint."""
-        kind, percent, *_rest = item.values
-        if kind != OF_RANGE:
-            told = "none" if kind is None else f"{kind:g}"
-            return f"of {name} types percent of the range (2) is done, not type {told}"
-        if percent is None or not 0.0 <= percent <= _WHOLE:
-            told = "none" if percent is None else f"{percent:g}"
-            return f"a {name} is 0 to 100 % of the range, not {told}"
-        self._lens[name] = (item, percent)
-        return ""
 
     def _film(self, item: PlanItem, waypoints: list[Waypoint], *, on: bool) -> str:
         """Begin or end a video at the waypoint before."""

@@ -1,4 +1,4 @@
-"""Pictures, video, gimbal, lens and places to look at of waypoints, as a plan's items."""
+"""Pictures, video, gimbal and places to look at of waypoints, as a plan's items."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.extensions.payload.actions import (
     AimGimbal,
     RecordVideo,
-    SetLens,
     TakePhoto,
     TriggerPhotos,
 )
 from aerodaas.extensions.plans.commands import (
     FRAME_MISSION,
     MOUNT_MAVLINK_TARGETING,
-    OF_RANGE,
 )
 from aerodaas.extensions.plans.plan import PlanItem
 from aerodaas.messages.waypoints import Waypoint
@@ -47,11 +45,6 @@ class PictureWriter:
                 for none.
         """
         yield from self._triggers(waypoint.action(TriggerPhotos))
-        lens = waypoint.action(SetLens) or SetLens()
-        if lens.zoom is not None:
-            yield _item(mavlink.MAV_CMD_SET_CAMERA_ZOOM, OF_RANGE, lens.zoom)
-        if lens.focus is not None:
-            yield _item(mavlink.MAV_CMD_SET_CAMERA_FOCUS, OF_RANGE, lens.focus)
         gimbal = waypoint.action(AimGimbal)
         if gimbal is not None:
             values = (math.degrees(gimbal.pitch), 0.0, -math.degrees(gimbal.yaw), 0.0)

@@ -15,7 +15,7 @@ from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.actuators.actions import MoveActuator
-from aerodaas.extensions.payload.actions import LookAt, RecordVideo
+from aerodaas.extensions.payload.actions import LookAt, RecordVideo, SetLens
 from aerodaas.extensions.plans.actuators import move_item
 from aerodaas.extensions.plans.commands import (
     FRAME_ABOVE_GROUND,
@@ -169,6 +169,7 @@ def _left_out(waypoints: Sequence[Waypoint]) -> Iterator[Notice]:
     for what, named in (
         ("priorities", [w.id for w in waypoints if w.priority != DEFAULT_PRIORITY]),
         ("deadlines", [w.id for w in waypoints if w.deadline is not None]),
+        ("zoom and focus", [w.id for w in waypoints if w.action(SetLens)]),
     ):
         if named:
             yield Notice(

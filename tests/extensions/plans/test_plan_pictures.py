@@ -111,64 +111,6 @@ def test_a_region_of_interest_is_looked_at_until_it_ends(tmp_path: Path) -> None
     assert keywords(old[0]).look_at == (47.1, 8.1, 4.0)
 
 
-def test_zoom_and_focus_are_the_next_waypoints(tmp_path: Path) -> None:
-    """Or the one's before, where they come before pictures there; the last of several counts."""
-    waypoints, notices = read(
-        tmp_path,
-        do(531, 2, 10),
-        do(531, 2, 20),
-        waypoint(0.001),
-        do(532, 2, 0),
-        waypoint(0.0015),
-        waypoint(0.002),
-        do(531, 2, 100),
-        do(532, 2, 55.5),
-        do(2000, 0, 0, 1),
-        do(531, 2, 30),
-        waypoint(0.003),
-        do(531, 2, 40),
-        do(206, 25, 0, 1),
-        waypoint(0.004),
-    )
-    assert notices == []
-    assert [keywords(one).zoom for one in waypoints] == [20.0, None, 100.0, 30.0, 40.0, None]
-    assert [keywords(one).focus for one in waypoints] == [None, 0.0, 55.5, None, None, None]
-    assert [keywords(one).photo for one in waypoints] == [False, False, True, False, False, False]
-    assert [keywords(one).trigger_distance for one in waypoints][-2:] == [None, 25.0]
-    assert waypoints[3].x == waypoints[4].x
-
-
-def test_a_lens_that_is_set_anew_for_pictures_is_a_waypoint_of_its_own(tmp_path: Path) -> None:
-    """The zoom of the way there stays that of the way, and the stay is stayed once."""
-    waypoints, notices = read(
-        tmp_path,
-        do(205, -90, z=2),
-        do(531, 2, 10),
-        waypoint(0.001, hover=5.0),
-        do(531, 2, 40),
-        do(532, 2, 50),
-        do(2000, 0, 0, 1),
-    )
-    assert notices == []
-    assert [(keywords(one).zoom, keywords(one).focus) for one in waypoints] == [
-        (10.0, None),
-        (40.0, 50.0),
-    ]
-    assert [keywords(one).photo for one in waypoints] == [False, True]
-    assert [one.hover_duration for one in waypoints] == [5.0, 0.0]
-    assert [keywords(one).gimbal_pitch is None for one in waypoints] == [False, True]
-    assert len({one.id for one in waypoints}) == 2
-    assert np.array_equal(waypoints[0].position, waypoints[1].position)
-
-
-def test_mission_planners_lens_is_read(tmp_path: Path) -> None:
-    """Its lines have the same parameters."""
-    rows = ("0 531 2 75 0 0 0 0 0", "0 532 2 100 0 0 0 0 0", "3 16 0 0 0 0 47.001 8 20")
-    ((one,), notices) = flown_plan(lines(tmp_path / "a.waypoints", *rows))
-    assert (keywords(one).zoom, keywords(one).focus) == (75.0, 100.0)
-    assert notices == []
-
-
 @pytest.mark.parametrize(
     ("items", "why"),
     [
@@ -188,14 +130,7 @@ def test_mission_planners_lens_is_read(tmp_path: Path) -> None:
         ([do(195, x=47, y=8, frame=10), waypoint(0.001)], "not counted from what the waypoint"),
         ([do(201, 1), waypoint(0.001)], "no gimbal is moved"),
         ([do(197), waypoint(0.001)], "no gimbal is moved"),
-        ([do(531, 0, 1), waypoint(0.001)], "of zoom types percent of the range (2) is done, not"),
-        ([do(531, 3, 50), waypoint(0.001)], "is done, not type 3"),
-        ([do(531, None, 50), waypoint(0.001)], "is done, not type none"),
-        ([do(532, 4), waypoint(0.001)], "of focus types percent of the range (2) is done, not"),
-        ([do(531, 2, 101), waypoint(0.001)], "a zoom is 0 to 100 % of the range, not 101"),
-        ([do(532, 2, -1), waypoint(0.001)], "a focus is 0 to 100 % of the range, not -1"),
-        ([do(532, 2, None), waypoint(0.001)], "a focus is 0 to 100 % of the range, not none"),
-        ([waypoint(0.001), do(531, 2, 9)], "no waypoint comes after it"),
+        ([do(531, 2, 40), waypoint(0.001)], "the lens stays as it is"),
         ([do(2500), waypoint(0.001)], "no waypoint comes before it"),
         ([waypoint(0.001), do(2501, 2)], "is recorded whole, not its stream 2"),
     ],
@@ -237,7 +172,6 @@ def test_a_video_begins_and_ends_at_the_waypoint_before(tmp_path: Path) -> None:
         tmp_path,
         waypoint(0.001),
         do(1000, -45, 30, None, None, x=12),
-        do(531, 2, 30),
         do(2000, 0, 0, 1),
         do(2500),
         waypoint(0.002),
@@ -249,7 +183,6 @@ def test_a_video_begins_and_ends_at_the_waypoint_before(tmp_path: Path) -> None:
     assert [keywords(one).video for one in waypoints] == [True, False, None]
     assert [keywords(one).photo for one in waypoints] == [True, False, False]
     assert [keywords(one).gimbal_pitch is not None for one in waypoints] == [True, False, True]
-    assert [keywords(one).zoom for one in waypoints] == [30.0, None, None]
     both = read(tmp_path, waypoint(0.001), do(2500), do(2501))[0]
     assert [keywords(one).video for one in both] == [True, False]
     begun = read(tmp_path, waypoint(0.001), do(1000, -45, 30, None, None, x=12), do(2500))[0]
@@ -274,28 +207,22 @@ def test_a_video_keeps_its_place_among_stay_picture_and_actuators(tmp_path: Path
     assert len({one.x for one in waypoints}) == 2
 
 
-percents = st.one_of(st.none(), st.floats(0.0, 100.0))
 videos = st.builds(
     lambda video, hover: {"video": video, "hover_duration": hover},
     st.sampled_from([None, True, False]),
     st.sampled_from([0.0, 5.0]),
 )
-lenses = st.builds(lambda zoom, focus: {"zoom": zoom, "focus": focus}, percents, percents)
 
 
 @pytest.mark.parametrize("suffix", ["plan", "waypoints"])
-@given(
-    legs=st.lists(
-        st.tuples(metres, metres, st.booleans(), aims, triggers, lenses, videos), max_size=7
-    )
-)
+@given(legs=st.lists(st.tuples(metres, metres, st.booleans(), aims, triggers, videos), max_size=7))
 def test_pictures_come_back(
     tmp_path_factory: pytest.TempPathFactory, suffix: str, legs: list[tuple[Any, ...]]
 ) -> None:
     """Each waypoint's own, whatever stood at the one before."""
     asked = [
-        Waypoint(f"w{n}", x, y, 20.0, waypoint_type="local", photo=photo, **(a | b | c | d))
-        for n, (x, y, photo, a, b, c, d) in enumerate(legs)
+        Waypoint(f"w{n}", x, y, 20.0, waypoint_type="local", photo=photo, **(a | b | c))
+        for n, (x, y, photo, a, b, c) in enumerate(legs)
     ]
     path = tmp_path_factory.mktemp("out") / f"a.{suffix}"
     with warnings.catch_warnings():
@@ -313,8 +240,6 @@ def test_pictures_come_back(
         assert keywords(theirs).gimbal_pitch == pytest.approx(keywords(ours).gimbal_pitch, abs=1e-9)
         assert keywords(theirs).gimbal_yaw == pytest.approx(keywords(ours).gimbal_yaw, abs=1e-9)
         assert keywords(theirs).look_at == pytest.approx(keywords(ours).look_at, abs=0.01)
-        assert keywords(theirs).zoom == pytest.approx(keywords(ours).zoom, abs=1e-6)
-        assert keywords(theirs).focus == pytest.approx(keywords(ours).focus, abs=1e-6)
 
 
 def test_what_a_ground_station_finds_of_pictures(tmp_path: Path) -> None:
@@ -325,7 +250,6 @@ def test_what_a_ground_station_finds_of_pictures(tmp_path: Path) -> None:
         Waypoint("c", 60, 9, 12, waypoint_type="local", trigger_distance=5.0, photo=True),
         Waypoint("d", 60, 30, 12, waypoint_type="local", trigger_interval=2.0),
         Waypoint("e", 0, 30, 12, waypoint_type="local", look_at=(10.0, 10.0, 1.0)),
-        Waypoint("f", 0, 40, 12, waypoint_type="local", zoom=40.0, focus=70.0),
     ]
     path = tmp_path / "a.plan"
     AeroNavigation(data=flown).to_plan(path, HOME)
@@ -345,12 +269,9 @@ def test_what_a_ground_station_finds_of_pictures(tmp_path: Path) -> None:
         2001,
         195,
         16,
-        531,
-        532,
-        16,
         20,
     ]
-    assert [one.number for one in items] == list(range(1, 18))
+    assert [one.number for one in items] == list(range(1, 15))
     assert items[1].values == (-90.0, 0.0, 0.0, 0.0)
     assert items[1].z == 2.0
     assert items[3].values[:3] == (5.0, 0.0, 1.0)
@@ -358,4 +279,3 @@ def test_what_a_ground_station_finds_of_pictures(tmp_path: Path) -> None:
     assert items[7].values[0] == 0.0
     assert items[8].values[:3] == (0.0, 2.0, 0.0)
     assert items[11].frame == 3
-    assert [one.values[:2] for one in items[13:15]] == [(2.0, 40.0), (2.0, 70.0)]
