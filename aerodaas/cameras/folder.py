@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.cameras.base import Picture
-from aerodaas.cameras.picture_size import picture_format
+from aerodaas.cameras.picture_size import picture_format, picture_size
 from aerodaas.cameras.settings import camera_model, camera_settings, required_path
 from aerodaas.clock import seconds
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
@@ -23,11 +23,6 @@ from aerodaas.messages.odometry import Odometry
 __all__ = ["FolderCamera"]
 
 _log = logging.getLogger(__name__)
-_JPEG_FRAME = re.compile(
-    rb"\xff[\xc0-\xc3\xc5-\xc7\xc9-\xcb\xcd-\xcf]\x00[\x0b\x11\x14].(..)(..)[\x01\x03\x04]",
-    re.DOTALL,
-)
-"""Start of a frame: length, precision, height, width, components."""
 _MOST_PIXELS = 100_000_000
 """Pixels of the largest picture: a small file may claim gigabytes of them."""
 _KINDS = {".jpg", ".jpeg", ".png", ".bmp", ".webp"}
@@ -152,22 +147,12 @@ def _decode(path: Path) -> NDArray[np.uint8] | None:
     return None if image is None else np.asarray(image, np.uint8)
 
 
-def _pixels(content: bytes) -> int:
-    """Pixels that the header of a PNG, JPEG or BMP claims; 0 if it claims none.
-
-    WebP has at most 16383 x 16383 by its format.
-    """
-    kind = picture_format(content)
-    if kind == "png":
-        return int.from_bytes(content[16:20], "big") * int.from_bytes(content[20:24], "big")
+def _pixels(content: bytes) -> float:
+    """Pixels that the header of a picture claims; infinite if it is no picture's."""
     if content.startswith(b"BM"):
         sides = (content[18:22], content[22:26])
         return abs(math.prod(int.from_bytes(one, "little", signed=True) for one in sides))
-    if kind == "jpeg":
-        frames = _JPEG_FRAME.finditer(content)
-        areas = (int.from_bytes(one[1], "big") * int.from_bytes(one[2], "big") for one in frames)
-        return max(areas, default=0)
-    return 0
+    return math.prod(picture_size(content) or (math.inf,))
 
 
 def _is_cut_short(content: bytes) -> bool:
