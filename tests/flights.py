@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -328,3 +330,22 @@ def passed_at(one: Flight, waypoint_id: str) -> float:
         if isinstance(sent, PositionSetpoint) and np.array_equal(sent.position, current.position):
             speeds.append(sent.passing_speed)
     return max(speeds)
+
+
+class Waiting(Executor):
+    """Runs what it is given when asked to."""
+
+    def __init__(self) -> None:
+        self.jobs: list[tuple[Future[Any], Any]] = []
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:  # noqa: ANN401
+        """Keep the job."""
+        future: Future[Any] = Future()
+        self.jobs.append((future, lambda: fn(*args, **kwargs)))
+        return future
+
+    def finish(self) -> None:
+        """Run what waits."""
+        jobs, self.jobs = self.jobs, []
+        for future, job in jobs:
+            future.set_result(job())

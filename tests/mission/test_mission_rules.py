@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import Executor, Future
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from flights import Flight, KinematicVehicle, add, flight, live, square
+from flights import Flight, KinematicVehicle, Waiting, add, flight, live, square
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import GeofenceConfig, LimitsConfig
@@ -301,25 +300,6 @@ def test_each_of_two_drones_takes_half_of_the_room_between_them() -> None:
     assert 3.0 <= nearest < 4.0
 
 
-class Waiting(Executor):
-    """Runs what it is given when asked to."""
-
-    def __init__(self) -> None:
-        self.jobs: list[tuple[Future[Any], Any]] = []
-
-    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:  # noqa: ANN401
-        """Keep the job."""
-        future: Future[Any] = Future()
-        self.jobs.append((future, lambda: fn(*args, **kwargs)))
-        return future
-
-    def finish(self) -> None:
-        """Run what waits."""
-        jobs, self.jobs = self.jobs, []
-        for future, job in jobs:
-            future.set_result(job())
-
-
 class Reversed(OrderedScheduler):
     """Plans the other way round, and leaves the first out."""
 
@@ -411,20 +391,6 @@ def test_a_plan_from_before_a_clear_is_void_with_several_waypoints_left() -> Non
     one.turn()
     assert [waypoint.id for waypoint in one.status.pending] == ["wp1", "wp2", "wp3"]
     assert not one.status.given_up
-
-
-def test_only_the_first_item_of_a_clearing_stream_clears() -> None:
-    """What is queued after that is kept, however much more the stream says."""
-    one = flight(add(*square()), live(clear_first=True))
-    one.run(10.0)
-    one.tell(command())
-    one.turn()
-    assert not one.status.pending
-    one.tell(add(Waypoint("later", 5, 5, 1.5)))
-    one.tell(command())
-    one.turn()
-    assert one.status.target is not None
-    assert one.status.target.id == "later"
 
 
 def test_a_target_that_moves_stays_under_way() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from aerodaas.errors import MissionError
 from aerodaas.messages.mission import MissionState
-from aerodaas.mission.state_machine import TRANSITIONS, MissionStateMachine
+from aerodaas.mission.state_machine import TERMINAL, TRANSITIONS, MissionStateMachine
 
 
 def test_a_change_is_dated_and_has_its_reason() -> None:
@@ -31,3 +31,16 @@ def test_only_what_is_listed_may_follow(state: MissionState) -> None:
         with pytest.raises(MissionError, match=f"{state.value} cannot become {following.value}"):
             machine.to(following, 1)
         assert machine.state is state
+
+
+def test_every_state_is_reachable() -> None:
+    """Thirteen states, each reached from IDLE."""
+    reached, waiting = set[MissionState](), [MissionState.IDLE]
+    while waiting:
+        state = waiting.pop()
+        if state not in reached:
+            reached.add(state)
+            waiting.extend(TRANSITIONS[state])
+    assert reached == set(MissionState)
+    assert len(reached) == 13
+    assert {MissionState.LANDED, MissionState.ABORTED} == TERMINAL
