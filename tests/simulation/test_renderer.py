@@ -159,18 +159,6 @@ def test_the_same_seed_gives_the_same_picture_and_another_seed_another() -> None
     assert not np.array_equal(other, same[0])
 
 
-def test_two_renderers_do_not_disturb_each_other() -> None:
-    """Cameras of one process keep their own sizes, worlds and poses."""
-    wide, small = CAMERAS["plain"], CameraModel.from_fov(64, 48, 1.0)
-    one, other = Renderer(world(), wide), Renderer(world(seed=2), small)
-    first = one.render(0.0, pose(0, 0, 1.5))
-    assert other.render(0.0, pose(0, 0, 5.0, yaw=1.0)).shape == (48, 64, 3)
-    assert np.array_equal(one.render(0.0, pose(0, 0, 1.5)), first)
-    one.close()
-    assert other.render(1.0, pose(0, 0, 5.0)).shape == (48, 64, 3)
-    other.close()
-
-
 def test_a_picture_occupies_no_second_thread() -> None:
     """OpenCV's others would spin beside the renderer, on a core that other actors need."""
     before = cv2.getNumThreads()
@@ -191,14 +179,6 @@ def test_sky_above_and_meadow_below() -> None:
     assert sky[0] > sky[2]
     assert meadow[1] > meadow[0]
     assert meadow[1] > meadow[2] > meadow[0]
-
-
-def test_a_landed_camera_still_sees_the_ground() -> None:
-    """Standing on the ground, the lower half of the picture is meadow."""
-    renderer = Renderer(world(), CAMERAS["plain"])
-    below = renderer.render(0.0, pose(0, 0, 0)).astype(float)[100:].mean(axis=(0, 1))
-    renderer.close()
-    assert below[1] > 1.3 * below[0]
 
 
 def test_a_long_flight_does_not_fill_the_memory() -> None:

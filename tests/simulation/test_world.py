@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any, Literal
@@ -158,14 +157,6 @@ def test_a_walk_rests_where_it_says() -> None:
     assert resting.at(reached + 14.0).x == pytest.approx(plain.at(reached + 4.0).x, abs=0.02)
 
 
-def test_one_may_fall_on_the_face() -> None:
-    """The head lies ahead of the feet then, else behind them; both lie on the ground."""
-    for forward in (True, False):
-        body = joints(1.75, Posture(fallen=1.0, forward=forward))
-        assert bool(body[JOINTS.index("head"), 0] > body[JOINTS.index("left_ankle"), 0]) is forward
-        assert -0.1 < body[:, 2].min() < body[:, 2].max() < 0.5
-
-
 def test_a_seed_displaces_a_walk_but_not_its_start() -> None:
     """Within the jitter; the same seed gives the same way."""
     motion = Motion(points=[(0, 0), (10, 0), (10, 10)], jitter=1.0, variation=0.0)
@@ -244,11 +235,3 @@ def test_a_missing_world_names_the_known_ones() -> None:
     """Neither a name nor a file: the message lists what there is."""
     with pytest.raises(ConfigError, match="campus, disaster, empty, field"):
         World.load(SimulationConfig(world="atlantis"))
-
-
-def test_a_scenario_of_ones_own(tmp_path: Path) -> None:
-    """A path loads like a name."""
-    path = tmp_path / "mine.json"
-    path.write_text(json.dumps({"name": "mine", "entities": [{"kind": "tower", "id": "mast"}]}))
-    [box] = World.load(SimulationConfig(world=str(path))).boxes(0.0)
-    assert (box.label, box.size[2]) == ("tower", 35.0)

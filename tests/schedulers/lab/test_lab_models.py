@@ -96,12 +96,6 @@ def test_a_bad_file_is_explained(tmp_path: Path, change: dict[str, object], word
         load_workload(file)
 
 
-def test_a_missing_file_is_explained() -> None:
-    """By its name."""
-    with pytest.raises(SchedulerError, match=r"nowhere.json"):
-        load_workload("nowhere.json")
-
-
 @pytest.mark.parametrize("distribution", ["lognormal", "gamma"])
 @pytest.mark.parametrize("variation", [0.15, 0.5])
 def test_factors_have_mean_one_and_the_variation_asked_for(
@@ -151,18 +145,6 @@ def test_an_outage_loses_what_overlaps_it() -> None:
     assert network.cloud_time(second, 15 * second) is None
     assert network.cloud_time(second, 20 * second) == second
     assert network.earliest_end(second, 15 * second) == 21 * second
-
-
-def test_a_bandwidth_trace_replaces_the_nominal_transfer(tmp_path: Path) -> None:
-    """40 kB at 10 Mbit/s take 32 ms; at 1 Mbit/s 320, over a change of bandwidth in between."""
-    file = tmp_path / "trace.csv"
-    file.write_text("seconds,mbps\n0,10\n1,1\n2,10\n")
-    network = Network.named(f"trace:{file}", MINUTE)
-    nominal = 500 * MILLISECOND
-    assert network.cloud_time(nominal, 0) == nominal
-    assert network.cloud_time(nominal, NANOSECONDS) == nominal + 288 * MILLISECOND
-    # From 1.9 s: 100 ms at 1 Mbit/s carry 12.5 kB, the rest takes 22 ms.
-    assert network.cloud_time(nominal, 1900 * MILLISECOND) == nominal + 90 * MILLISECOND
 
 
 @pytest.mark.parametrize(

@@ -82,23 +82,6 @@ def test_seeds_give_identical_results_however_they_are_spread() -> None:
     assert alone.scores["margin"][0] != alone.scores["margin"][1]
 
 
-def test_schedulers_meet_the_same_sample_path() -> None:
-    """Another scheduler beside it does not change a scheduler's result."""
-    one = run_lab(SHORT, ["dems"], [0], times=VARYING, bound=False, jobs=1)
-    two = run_lab(SHORT, ["ec_edf", "dems"], [0], times=VARYING, bound=False, jobs=1)
-    assert one.scores["dems"] == two.scores["dems"]
-
-
-def test_a_fleet_is_the_sum_of_its_edges() -> None:
-    """Four drones over two edges make as many tasks as four on one, done more often."""
-    fleet = Workload.named("4D-A/2", 10 * NANOSECONDS)
-    one = Workload.named("4D-A", 10 * NANOSECONDS)
-    spread = run_lab(fleet, ["edf"], [0], bound=False, jobs=1).scores["edf"][0]
-    crowded = run_lab(one, ["edf"], [0], bound=False, jobs=1).scores["edf"][0]
-    assert spread.tasks == crowded.tasks
-    assert spread.done > crowded.done
-
-
 def test_progress_and_figures() -> None:
     """Each part is reported; figures are shares and rates with intervals."""
     seen: list[tuple[int, int]] = []

@@ -107,19 +107,6 @@ def test_a_true_difference_is_found_and_none_is_made_up() -> None:
     assert worse["mean"] == 0
 
 
-def test_processes_change_nothing(result: SweepResult) -> None:
-    """However the seeds are shared out."""
-    sweep: dict[str, list[Any]] = {"drones": [1, 3], "network": ["steady", "outage"]}
-    words = {**SETTINGS, "jobs": 2}
-    told: list[tuple[int, int]] = []
-    shared = run_sweep(
-        ["ec_edf", "fifo"], sweep, seeds=range(3), **words,
-        progress=lambda done, total: told.append((done, total)),
-    )  # fmt: skip
-    assert shared.rows == result.rows
-    assert told == [(part, 12) for part in range(1, 13)]
-
-
 @pytest.mark.parametrize(
     ("schedulers", "parameters", "words", "message"),
     [

@@ -41,12 +41,6 @@ def test_mahimahi_counts_packets_and_begins_anew(tmp_path: Path) -> None:
     assert found == pytest.approx([0.48, 0, 0.48, 0.48, 0])
 
 
-def test_a_steady_mahimahi_trace_is_one_rate(tmp_path: Path) -> None:
-    """A packet a millisecond is 12 Mbit/s, however long the run."""
-    path = written(tmp_path, "1\n")
-    assert read_bandwidth(path, 86_400 * SECOND) == ((0, 1_500_000.0),)
-
-
 def test_a_cooked_trace_gives_each_rate_up_to_its_time(tmp_path: Path) -> None:
     """As Pensieve plays it: the first line only begins; then again from the second."""
     path = written(tmp_path, "100.0 9\n101.0 2.5\n103.0\t0.5\n")
@@ -60,13 +54,6 @@ def test_what_is_sent_into_no_bandwidth_waits_for_it(tmp_path: Path) -> None:
     nominal = 500 * MILLISECOND
     taken = network.cloud_time(nominal, 1100 * MILLISECOND)
     assert taken == nominal + (900 + 40 - 32) * MILLISECOND
-
-
-def test_without_bandwidth_until_the_end_it_is_lost() -> None:
-    """An execution that cannot begin never ends."""
-    network = Network(bandwidth=((0, 1e6), (SECOND, 0.0)))
-    assert network.cloud_time(SECOND, 2 * SECOND) is None
-    assert network.cloud_time(SECOND, 0) is not None
 
 
 @pytest.mark.parametrize(
@@ -161,14 +148,6 @@ def test_a_csv_of_times_is_a_workload(tmp_path: Path) -> None:
     assert {task.source for task in workload.tasks(1, random.Random(0))} == {"b"}
 
 
-def test_times_without_a_heading_and_with_models(tmp_path: Path) -> None:
-    """A single column is seconds; a row that names its model is one task."""
-    plain = read_arrivals(str(written(tmp_path, "0.5\n1\n")))
-    assert len(plain.tasks(0, random.Random(0))) == 12
-    named = read_arrivals(str(written(tmp_path, "seconds,model\n0.5,HV\n1,DEO\n")))
-    assert [one.profile.model for one in named.tasks(0, random.Random(0))] == ["HV", "DEO"]
-
-
 def test_the_lab_runs_a_trace_on_a_trace(tmp_path: Path) -> None:
     """Arrivals and network of files; all tasks are accounted for."""
     times = written(tmp_path, "0.5\n1\n1\n2\n4\n4.5\n", "seconds.csv")
@@ -204,20 +183,3 @@ def test_bad_arrivals_are_told_with_their_line(
     """What is wrong, and where."""
     with pytest.raises(SchedulerError, match=rf"trace\.log.*{told}"):
         read_arrivals(str(written(tmp_path, text)))
-
-
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
-@given(st.one_of(st.text(alphabet='0123456789.,-en"\n', max_size=60), st.text(max_size=40)))
-def test_any_text_is_a_workload_or_an_error(tmp_path: Path, text: str) -> None:
-    """With a heading or without; tasks come in order and within the run."""
-    for heading in ("", "seconds\n", "seconds,edge\n"):
-        path = written(tmp_path, (heading + text).encode("utf-8", "replace"))
-        try:
-            load = read_arrivals(str(path))
-        except SchedulerError as error:
-            assert str(path) in str(error)  # noqa: PT017 - either is right
-            continue
-        if load.duration < 10**6 * SECOND:
-            stamps = [task.arrival for task in load.tasks(0, random.Random(0))]
-            assert stamps == sorted(stamps)
-            assert all(0 <= stamp < load.duration for stamp in stamps)

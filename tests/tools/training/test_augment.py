@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerodaas.analytics.people.joints import MIRRORED
 from tools.training.augment import augmented, placed
 from tools.training.dataset import Sample
 
@@ -50,12 +49,6 @@ def test_the_box_moves_with_the_pixels(
     assert sample.boxes[0] == pytest.approx(drawn, abs=2.5)
     # Of a mirrored person, the left shoulder is the one that was right: it stays on the right.
     assert (sample.keypoints[0, 5, 0] < sample.keypoints[0, 6, 0]) or width * scale < 4
-
-
-def test_mirroring_twice_names_the_keypoints_as_before() -> None:
-    """The table is its own inverse, and the nose stays the nose."""
-    assert [MIRRORED[other] for other in MIRRORED] == list(range(17))
-    assert MIRRORED[0] == 0
 
 
 def test_what_is_cut_away_has_no_label() -> None:

@@ -56,13 +56,6 @@ def test_a_persons_keypoints_lie_where_the_skeleton_is_drawn() -> None:
     assert points[5, 0] > points[6, 0]
 
 
-def test_a_vest_belongs_to_its_person() -> None:
-    """The person's box reaches around the vest."""
-    labels, _ = look(VIP)
-    assert (labels["person"].box[:2] <= labels["vest"].box[:2]).all()
-    assert (labels["person"].box[2:] >= labels["vest"].box[2:]).all()
-
-
 def test_what_is_hidden_has_no_label_and_what_is_cut_has_a_cut_one() -> None:
     """A house hides the person behind it; a car that is half outside ends at the edge."""
     house = {"kind": "building", "id": "house", "at": (3.0, 0.0), "size": (0.5, 3.0, 3.0)}
