@@ -103,11 +103,6 @@ class Dispatch:
         self._host = host
         self._adopt(scheduler)
 
-    @property
-    def cloud_waiting(self) -> int:
-        """Tasks sent to the cloud that no slot has taken yet."""
-        return len(self._cloud_queue)
-
     def start(self, now: int) -> None:
         """Begin a run."""
         self.guarded(self.scheduler.start)(self.resources, now)

@@ -118,16 +118,6 @@ class Machine:
         self._starter.communicate()
         psutil.wait_procs(left, timeout=_DYING_SECONDS)
 
-    def freeze(self) -> None:
-        """Stop all its processes without their knowing, as a virtual machine is paused."""
-        for process in self.processes():
-            process.suspend()
-
-    def thaw(self) -> None:
-        """Let a frozen machine go on."""
-        for process in self.processes():
-            process.resume()
-
 
 def _mount(folder: Path) -> str:
     """The command that hides what is in a folder, with the rights that it has."""
