@@ -61,25 +61,27 @@ class Taken(NamedTuple):
     use: str
     """An option of `aerodaas import`."""
     name: str
-    """Id of the sensor, or name of the analysis."""
+    """Id of the sensor."""
     topic: str
 
 
 @dataclass(frozen=True, slots=True)
 class BagTopics:
-    """Topics by their use, and by the id of the sensor or analysis that they become."""
+    """Topics that are taken, by their use."""
 
     robot: str = "drone"
     """Id that the recording gives the vehicle."""
     camera: Mapping[str, str] = field(default_factory=dict)
-    odometry: Mapping[str, str] = field(default_factory=dict)
-    """One at most, for a vehicle is at one place; as with fix and battery."""
-    gps: Mapping[str, str] = field(default_factory=dict)
-    battery: Mapping[str, str] = field(default_factory=dict)
+    """Topics of pictures by the cameras' ids."""
+    odometry: str | None = None
+    gps: str | None = None
+    battery: str | None = None
 
     def taken(self) -> list[Taken]:
         """All topics."""
-        return [Taken(use, *one) for use in _TYPES for one in getattr(self, use).items()]
+        single = ((use, getattr(self, use)) for use in _SINGLE)
+        cameras = [Taken("camera", *one) for one in self.camera.items()]
+        return [*cameras, *(Taken(use, use, topic) for use, topic in single if topic is not None)]
 
     def check(self, known: Mapping[str, Topic]) -> None:
         """Compare with the topics of a bag.
@@ -99,8 +101,6 @@ class BagTopics:
                     f"{topic} {found}; {use} takes {' or '.join(_TYPES[use])}, and the bag has: "
                     f"{', '.join(sorted(fitting)) or 'none'}"
                 )
-            if use in _SINGLE and len(getattr(self, use)) > 1:
-                raise RecordingError(f"take one topic for {use}, not {len(getattr(self, use))}")
         for index, what in ((1, "stream"), (2, "topic")):
             name, count = Counter(one[index] for one in taken).most_common(1)[0]
             if count > 1:

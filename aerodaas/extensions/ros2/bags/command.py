@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -19,11 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["import_bag", "ros2"]
 
 Taken = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="[ID=]TOPIC",
-        help="What becomes the sensor ID, which is called as the option if left out.",
-    ),
+    str | None,
+    typer.Option(metavar="TOPIC", help="What becomes the sensor that is called as the option."),
 ]
 
 
@@ -32,7 +30,10 @@ def import_bag(
         Path,
         typer.Argument(help="A ROS 2 bag: its folder, or its .mcap file.", show_default=False),
     ],
-    camera: Taken = None,
+    camera: Annotated[
+        list[str] | None,
+        typer.Option(metavar="[ID=]TOPIC", help="Pictures of the camera ID, `camera` if left out."),
+    ] = None,
     odometry: Taken = None,
     gps: Taken = None,
     battery: Taken = None,
@@ -60,13 +61,7 @@ def import_bag(
     from aerodaas.extensions.ros2.bags.bag_preview import BagTopics  # noqa: PLC0415
     from aerodaas.extensions.ros2.bags.importing import import_bag as write  # noqa: PLC0415
 
-    taken = BagTopics(
-        robot,
-        camera=_named(camera, "camera"),
-        odometry=_named(odometry, "odometry"),
-        gps=_named(gps, "gps"),
-        battery=_named(battery, "battery"),
-    )
+    taken = BagTopics(robot, _cameras(camera or ()), odometry, gps, battery)
     with RosBag.open(bag) as opened:
         if not taken.taken():
             typer.echo("\n".join(_topics(opened)))
@@ -94,11 +89,11 @@ def ros2(
     export(recording, out, lambda opened, to: [write_bag(opened, to, storage)])
 
 
-def _named(given: list[str] | None, usual: str) -> dict[str, str]:
+def _cameras(given: Iterable[str]) -> dict[str, str]:
     found: dict[str, str] = {}
-    for text in given or ():
+    for text in given:
         name, equals, topic = text.rpartition("=")
-        name = name if equals else usual
+        name = name if equals else "camera"
         if name in found:
             raise ConfigError(f"two topics would be {name!r}: name them, as in front={topic}")
         found[name] = topic

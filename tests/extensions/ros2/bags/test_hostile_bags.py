@@ -15,7 +15,7 @@ from aerodaas.extensions.ros2.bags.bag_preview import BagTopics
 from aerodaas.extensions.ros2.bags.importing import ImportedBag, import_bag
 from aerodaas.extensions.ros2.topics.types import TRANSFORMS, ros_decoder, ros_message
 
-TOPICS = BagTopics(odometry={"odometry": "/odom"})
+TOPICS = BagTopics(odometry="/odom")
 
 
 def imported(bag: Path, folder: Path, topics: BagTopics = TOPICS) -> ImportedBag:
@@ -110,12 +110,11 @@ def test_odometry_in_another_frame_is_refused(tmp_path: Path, frame: str) -> Non
 
 
 def test_topics_that_do_not_fit_are_told_with_those_that_do(tmp_path: Path) -> None:
-    """Unknown, of another type, taken twice, too many, none."""
+    """Unknown, of another type, none."""
     bag = write(tmp_path / "bag", [odometry(0)])
     cases = [
-        (BagTopics(odometry={"o": "/nowhere"}), "/nowhere is not there.*the bag has: /odom"),
+        (BagTopics(odometry="/nowhere"), "/nowhere is not there.*the bag has: /odom"),
         (BagTopics(camera={"c": "/odom"}), "is nav_msgs/msg/Odometry; camera takes"),
-        (BagTopics(odometry={"a": "/odom", "b": "/odom"}), "one topic for odometry, not 2"),
         (BagTopics(), "at least a camera or odometry"),
     ]
     for topics, words in cases:

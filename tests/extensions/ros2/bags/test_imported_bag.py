@@ -66,9 +66,9 @@ def test_an_analysis_says_the_same_of_a_flight_and_of_its_bag(flyer: Flyer) -> N
         bag = write_bag(recording, flyer.folder)
     topics = BagTopics(
         camera={"cam": "/drone/cam/image/compressed"},
-        odometry={"odometry": "/drone/odometry"},
-        gps={"gps": "/drone/fix"},
-        battery={"battery": "/drone/battery"},
+        odometry="/drone/odometry",
+        gps="/drone/fix",
+        battery="/drone/battery",
     )
     back = flyer.folder / "back.mcap"
     with RosBag.open(bag) as opened:

@@ -38,9 +38,9 @@ from aerodaas.recording.recorder import FlightRecorder
 OURS = BagTopics(
     "tello",
     camera={"camera": "/tello/camera/image/compressed"},
-    odometry={"odometry": "/tello/odometry"},
-    gps={"gps": "/tello/fix"},
-    battery={"battery": "/tello/battery"},
+    odometry="/tello/odometry",
+    gps="/tello/fix",
+    battery="/tello/battery",
 )
 
 
@@ -241,11 +241,11 @@ def test_the_commands_list_and_convert(recorded: Path, tmp_path: Path) -> None:
     listed = runner.invoke(app, ["import", str(folder)]).output
     assert "--odometry /tello/odometry" in listed
     assert "--camera /tello/camera/image/compressed" in listed
-    words = ["--robot", "tello", "--odometry", "odom=/tello/odometry", "--out", f"{out}/back"]
+    words = ["--robot", "tello", "--odometry", "/tello/odometry", "--out", f"{out}/back"]
     result = runner.invoke(app, ["import", str(folder), *words])
     assert result.exit_code == 0, result.output
     with Recording.open(tmp_path / "back" / "flight.mcap") as recording:
-        assert "/tello/odom/odometry" in recording.topics
+        assert "/tello/odometry" in recording.topics
 
 
 def test_a_bag_is_written_whole_or_not_at_all(recorded: Path, tmp_path: Path) -> None:
