@@ -55,9 +55,7 @@ class Ros2Camera:
         self._name = sensor.full_id
         self._settings = settings = ros2_camera_settings(sensor, environment)
         self._domain = domain_of(settings.domain)
-        named = settings.topic.endswith(_COMPRESSED)
-        compressed = named if settings.compressed is None else settings.compressed
-        self._schema = COMPRESSED_IMAGE if compressed else IMAGE
+        self._schema = COMPRESSED_IMAGE if settings.topic.endswith(_COMPRESSED) else IMAGE
         self._lock = threading.Lock()
         self._clock = MessageClock(settings.stamps)
         self._link: RosLink | None = None

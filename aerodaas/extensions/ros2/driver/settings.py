@@ -72,8 +72,6 @@ class Ros2CameraSettings(CameraConfig):
     """
 
     topic: TopicName  # pyright: ignore - of these cameras it is required
-    compressed: bool | None = None
-    """Whether the topic's type is `CompressedImage`; by default its name tells."""
     domain: Domain | None = None
     """DDS domain; by default that of the robot that carries the camera, if its driver is `ros2`."""
     stamps: StampSource = "auto"

@@ -185,10 +185,12 @@ def test_a_topic_without_pictures_is_told(
     kept = ros_link.publisher(f"{topics}/image/compressed", types.COMPRESSED_IMAGE)
     with pytest.raises(SourceError, match=rf"no picture on /no/compressed .*{topics}/image"):
         camera_of("/no/compressed").open()
-    wrong = f"{topics}/image/compressed is sensor_msgs/msg/CompressedImage, and not .*/Image"
+    other = ros_link.publisher(f"{topics}/raw/compressed", types.IMAGE)
+    wrong = f"{topics}/raw/compressed is sensor_msgs/msg/Image, and not .*/CompressedImage"
     with pytest.raises(SourceError, match=wrong):
-        camera_of(f"{topics}/image/compressed", compressed=False).open()
+        camera_of(f"{topics}/raw/compressed").open()
     assert not kept.listeners
+    assert not other.listeners
 
 
 def test_damaged_pictures_alone_are_told(
