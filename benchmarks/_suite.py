@@ -94,7 +94,6 @@ SPEED = tuple(
         ("latency", "--seconds 5 --rounds 1", (_DORA,)),
         ("trace", "--seconds 5", ()),
         ("hop", "--count 100 --rounds 1", ()),
-        ("preemption", "--events 10", ()),
         ("punctuality", "--seconds 10 --measures", ()),
         ("restart", "--times 1", ()),
         ("footprint", "--case hover,camera --seconds 8", ()),
