@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from command_line import exit_code
+from command_line import ran
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.runtime.checks import check_environment
@@ -28,9 +28,8 @@ def init_command(
 
     def run(*words: str, answers: str = "", command: str = "init") -> tuple[int, str]:
         monkeypatch.setattr("sys.stdin", io.StringIO(answers))
-        code = exit_code(command, *words)
-        told = capsys.readouterr()
-        return code, told.out + told.err
+        code, out, said = ran(capsys, command, *words)
+        return code, out + said
 
     return run
 

@@ -9,14 +9,13 @@ import socket
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from command_line import exit_code
+from command_line import Ended, exit_code, ran
 from flying import FLAT, robot
 
 from aerodaas.cli.doctor import examine
@@ -42,15 +41,6 @@ drone.navigate(AeroListData([Waypoint("a", 2, 0, 2)]))
 FLY = "drone.start_mission()\n"
 
 
-@dataclass
-class Ended:
-    """How a command ended."""
-
-    code: int
-    out: str
-    said: str
-
-
 class Commands:
     """Runs `aerodaas` in this process and a folder of the test's own."""
 
@@ -64,12 +54,7 @@ class Commands:
 
     def __call__(self, *words: str) -> Ended:
         """Run `aerodaas` with these words."""
-        self._capture.readouterr()
-        code = exit_code(*words)
-        captured = self._capture.readouterr()
-        assert "Traceback" not in captured.err
-        assert "Traceback" not in captured.out
-        return Ended(code, captured.out, captured.err)
+        return ran(self._capture, *words)
 
     def run(self, app: str, *words: str) -> Ended:
         """Write an application and run it, without the live view, into the folder `out`."""

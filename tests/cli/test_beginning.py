@@ -8,14 +8,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from command_line import exit_code
+from command_line import Ended, ran
 
 from aerodaas.cli.shipped import TEMPLATES, find_application, purpose, shipped_applications
 from aerodaas.environment.document.flying import compile_application
 from aerodaas.errors import ConfigError, MissionError
 from aerodaas.testing.flight import fly
 
-Command = Callable[..., tuple[int, str, str]]
+Command = Callable[..., Ended]
 TEMPLATE_NAMES = sorted(path.parent.name for path in TEMPLATES.glob("*/my_app.py"))
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -24,16 +24,10 @@ ROOT = Path(__file__).resolve().parents[2]
 def aerodaas(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Command:
-    """The command line in an empty folder: exit code, output and errors."""
+    """The command line in an empty folder."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
-
-    def run(*words: str) -> tuple[int, str, str]:
-        code = exit_code(*words)
-        told = capsys.readouterr()
-        return code, told.out, told.err
-
-    return run
+    return lambda *words: ran(capsys, *words)
 
 
 def test_the_applications_that_ship_are_the_repositorys() -> None:

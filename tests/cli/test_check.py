@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from command_line import exit_code
+from command_line import ran
 from flying import FLAT, robot
 
 from aerodaas.cli import doctor
@@ -116,9 +116,8 @@ class Checked:
         (self._folder / "check_parts.py").write_text(PARTS)
         sys.modules.pop("check_parts", None)
         self._patch.setattr(sys, "path", list(sys.path))
-        code = exit_code("check", "app.py", *words)
-        told = self._capture.readouterr()
-        return code, " ".join((told.out + told.err).split())
+        code, out, said = ran(self._capture, "check", "app.py", *words)
+        return code, " ".join((out + said).split())
 
 
 @pytest.fixture

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import socket
 from pathlib import Path
 from typing import Any, Literal
 
 import pytest
 from command_line import exit_code
+from emulated import LOOPBACK, free_port
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.loading import load_vehicle
@@ -20,7 +20,6 @@ from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 pytestmark = pytest.mark.wall_clock
 
-LOOPBACK = "127.0.0.1"
 SETTING = {"fallback": "set", "failsafes": "set", "fence": "land", "role": "ground_station"}
 """Of a flight that sets all there is."""
 COMMANDS = {
@@ -35,13 +34,6 @@ FLIES = {
     mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
     mavlink.MAV_CMD_NAV_TAKEOFF,
 }
-
-
-def free_port() -> int:
-    """A UDP port that nobody uses at present."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind((LOOPBACK, 0))
-        return int(probe.getsockname()[1])
 
 
 def file_of(settings: dict[str, Any]) -> EnvironmentConfig:

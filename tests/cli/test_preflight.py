@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command_line import exit_code
+from command_line import ran
 
 from tools.tello_vehicle import EmulatedTello
 
@@ -30,9 +30,8 @@ class Looked:
         """Exit code and output."""
         content = {"robots": [robot], **environment}
         (self._folder / "environment.json").write_text(json.dumps(content))
-        code = exit_code("check", "environment.json", "--robot", *words)
-        told = self._capture.readouterr()
-        return code, told.out + told.err
+        code, out, said = ran(self._capture, "check", "environment.json", "--robot", *words)
+        return code, out + said
 
 
 @pytest.fixture

@@ -7,11 +7,10 @@ import json
 import stat
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from command_line import exit_code
+from command_line import Ended, ran
 from provider_stub import MISSION, TOKEN, Stub, mission
 
 from aerodaas.environment.provider import exchange
@@ -29,15 +28,6 @@ drone.start_mission()
 """
 
 
-@dataclass
-class Ended:
-    """How a command ended."""
-
-    code: int
-    out: str
-    said: str
-
-
 Command = Callable[..., Ended]
 
 
@@ -52,15 +42,7 @@ def aerodaas(
     monkeypatch.setattr("aerodaas.terminal.console.show_results", lambda *_, **__: None)
     monkeypatch.setattr(exchange, "_FIRST_PAUSE", 0.01)
     (tmp_path / "app.py").write_text(APP)
-
-    def run(*words: str) -> Ended:
-        capsys.readouterr()
-        code = exit_code(*words)
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return Ended(code, captured.out, captured.err)
-
-    return run
+    return lambda *words: ran(capsys, *words)
 
 
 def test_the_fleet_is_a_table_or_json(aerodaas: Command) -> None:
