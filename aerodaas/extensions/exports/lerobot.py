@@ -57,26 +57,8 @@ _Floats = NDArray[np.float32]
 _Stamps = NDArray[np.int64]
 
 
-def write_tables(
-    path: Path,
-    task: str,
-    columns: dict[str, NDArray[Any]],
-    features: dict[str, dict[str, Any]],
-    fps: int,
-) -> None:
-    """Write all but the videos.
-
-    Args:
-        path: Folder of the dataset.
-        task: In words.
-        columns: N x values of each feature; of videos, samples of pixels, 0 to 1, N x 3 of RGB.
-        features: As `info.json` describes them.
-        fps: Rows a second.
-
-    Raises:
-        RecordingError: If pyarrow is missing.
-        OSError: If something cannot be written.
-    """
+def _write_tables(path: Path, task: str, episode: _Episode) -> None:
+    """Write all but the videos into the dataset's folder."""
     try:
         import pyarrow as pa  # noqa: PLC0415 - an extra
         from pyarrow import parquet  # noqa: PLC0415
@@ -84,14 +66,15 @@ def write_tables(
         raise RecordingError(
             'a LeRobot dataset needs pyarrow: pip install "aerodaas[parquet]"'
         ) from None
-    videos = [name for name, feature in features.items() if feature["dtype"] == "video"]
+    columns, features, fps = episode.columns(), episode.features(), episode.fps
+    videos = list(episode.cameras)
     count = len(columns["index"])
     stats = {name: _statistics(values, video=name in videos) for name, values in columns.items()}
     for name in videos:
         stats[name]["count"] = [count]
 
-    def save(table: Any, name: str, number: int = 0) -> None:  # noqa: ANN401 - pyarrow's
-        file = path / name.format(chunk_index=0, file_index=number)
+    def save(table: Any, name: str) -> None:  # noqa: ANN401 - pyarrow's
+        file = path / name.format(chunk_index=0, file_index=0)
         file.parent.mkdir(parents=True, exist_ok=True)
         parquet.write_table(table, file)
 
@@ -104,7 +87,7 @@ def write_tables(
         flat = pa.array(values.reshape(-1), kind)
         rows[name] = flat if width == 1 else pa.FixedSizeListArray.from_arrays(flat, width)
     save(pa.table(rows), f"data/{_FILE}.parquet")
-    episode: dict[str, list[Any]] = {
+    described: dict[str, list[Any]] = {
         "episode_index": [0],
         "tasks": [[task]],
         "length": [count],
@@ -112,15 +95,15 @@ def write_tables(
         "dataset_to_index": [count],
     }
     for name in ("data", "meta/episodes", *(f"videos/{video}" for video in videos)):
-        episode |= {f"{name}/chunk_index": [0], f"{name}/file_index": [0]}
+        described |= {f"{name}/chunk_index": [0], f"{name}/file_index": [0]}
     for video in videos:
-        episode |= {
+        described |= {
             f"videos/{video}/from_timestamp": [0.0],
             f"videos/{video}/to_timestamp": [count / fps],
         }
     for name, found in stats.items():
-        episode |= {f"stats/{name}/{figure}": [value] for figure, value in found.items()}
-    save(pa.table(episode), f"meta/episodes/{_FILE}.parquet")
+        described |= {f"stats/{name}/{figure}": [value] for figure, value in found.items()}
+    save(pa.table(described), f"meta/episodes/{_FILE}.parquet")
     save(_tasks(pa, task), "meta/tasks.parquet")
     info = {
         "codebase_version": "v3.0",
@@ -224,7 +207,7 @@ def write_lerobot(recording: Recording, folder: Path, *, task: str) -> list[Path
         try:
             for camera in _filmed(recording, path, cameras, episode):
                 episode.cameras[camera.key] = camera
-            write_tables(path, task, episode.columns(), episode.features(), episode.fps)
+            _write_tables(path, task, episode)
         except OSError as error:
             raise RecordingError(f"cannot write {path}: {error.strerror}") from None
         written.append(path)
