@@ -150,7 +150,7 @@ def _frame() -> None:
         session,
         "drone",
         (spec,),
-        lambda _, scheduler: InlinePlanner(scheduler),
+        InlinePlanner,
         observed={_FRAMES: sensor.rate},
     )
     camera = CameraNode(session, _FRAMES, sensor, state, ends=False)
