@@ -11,7 +11,6 @@ from typing import Any, Literal, cast
 
 import ray
 from ray.exceptions import ActorUnavailableError, RayActorError, RayTaskError
-from typing_extensions import Self
 
 from aerodaas.actors.base import ActorInfo, NodeActor
 from aerodaas.actors.cluster.head_watch import HeadWatch
@@ -72,7 +71,7 @@ _LOOKS = 2
 
 
 class Flight:
-    """The actors of one run; a context manager, whose exit stops them all."""
+    """The actors of one run."""
 
     def __init__(
         self,
@@ -132,14 +131,6 @@ class Flight:
         self._stopped = False
         self._sensed = False
         """Whether a run without drones is to end before its cameras do."""
-
-    def __enter__(self) -> Self:
-        """Return the run, whose actors are stopped on exit."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Stop the actors."""
-        self.stop()
 
     def launch(self, progress: Callable[[str], None] = lambda _: None) -> None:
         """Open everything and start flying; raises the errors of an actor's opening.
@@ -282,13 +273,6 @@ class Flight:
         """Node, process and streams of each launched actor."""
         return {m.name: m.info for m in self._members.values() if m.info is not None}
 
-    def publisher(self, stream: str) -> tuple[Any, str] | None:
-        """Actor handle and node of the publisher of `stream`; None without a publisher."""
-        for name, info in self.infos().items():
-            if stream in info.publishes:
-                return self._members[name].handle, info.node_id
-        return None
-
     def reader(self, stream: str, over: Callable[[], bool]) -> LiveReader | None:
         """A reader of `stream` for the application; None if no actor publishes it.
 
@@ -296,16 +280,17 @@ class Flight:
             stream: Name of the stream.
             over: Whether the flight is over.
         """
-        publisher = self.publisher(stream)
-        if publisher is None:
-            return None
-        return LiveReader(live_source(self.plan.session, stream, *publisher), over)
+        for name, info in self.infos().items():
+            if stream in info.publishes:
+                publisher = self._members[name].handle, info.node_id
+                return LiveReader(live_source(self.plan.session, stream, *publisher), over)
+        return None
 
     def stop(self) -> dict[str, ActorReport]:
         """Stop all actors, the recorder last, and return their final reports."""
         if self._stopped:
             return self.reports()
-        self._watch_no_longer()
+        self.detach()
         # The reaper's host last, for the application may die meanwhile.
         last = end_actors([self._ended_first(), [self._reaper]], self._helpers)
         for member in self._members.values():
@@ -326,10 +311,7 @@ class Flight:
             self._recordings.append(Path(path))
 
     def detach(self) -> None:
-        """Hand the drones and all other actors over to the orphan reaper."""
-        self._watch_no_longer()
-
-    def _watch_no_longer(self) -> None:
+        """Watch no longer: the drones and all other actors are the orphan reaper's."""
         self._stopped = True
         if self._liveness_monitor is not None:
             self._liveness_monitor.end()

@@ -31,7 +31,6 @@ __all__ = [
     "enu_to_body",
     "enu_to_ned",
     "flu_to_frd",
-    "frd_to_flu",
     "is_close",
     "is_finite",
     "length",
@@ -104,11 +103,6 @@ def ned_to_enu(vector: Vector) -> Vector:
 def flu_to_frd(vector: Vector) -> Vector:
     """(forward, left, up) to (forward, right, down); the same flip undoes itself."""
     return np.array([vector[0], -vector[1], -vector[2]])
-
-
-def frd_to_flu(vector: Vector) -> Vector:
-    """(forward, right, down) to (forward, left, up)."""
-    return flu_to_frd(vector)
 
 
 def yaw_enu_to_ned(yaw: float) -> float:

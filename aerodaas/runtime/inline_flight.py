@@ -12,8 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
-from typing_extensions import Self
-
 from aerodaas.config.options import LiveViews
 from aerodaas.errors import AeroDaaSError, MissionError, failure_line
 from aerodaas.messages.frames import Header
@@ -73,7 +71,7 @@ class Proxies(Protocol):
 
 
 class InlineFlight:
-    """The nodes of one run, stepped in a thread of this process; a context manager."""
+    """The nodes of one run, stepped in a thread of this process."""
 
     headless = ""
     """Address of a lost head; empty, for no cluster is used."""
@@ -155,14 +153,6 @@ class InlineFlight:
         last = (self._dispatcher, self._drone, self._recorder)
         analyses = _by_dependence(self._analyses)
         return [*self._cameras.values(), *analyses, *(node for node in last if node is not None)]
-
-    def __enter__(self) -> Self:
-        """Return the flight, which is stopped on exit."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Stop the flight."""
-        self.stop()
 
     def launch(self, progress: Callable[[str], None] = lambda _: None) -> None:
         """Open everything and start flying; raises the errors of a node's opening.

@@ -106,11 +106,6 @@ class DroneNode(Node):
         readings = [controller.next_reading for controller in self._controllers.values()]
         return min([self._due, *readings, *self._observed_at.values()])
 
-    @property
-    def next_cycle(self) -> int:
-        """Mission time at which the loop's next cycle is due."""
-        return self._due
-
     def step(self, now: int, inputs: Sequence[Message[Any]]) -> Sequence[Message[Any]]:
         """Handle messages, and execute a cycle of the loop if one is due.
 
