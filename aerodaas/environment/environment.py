@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from aerodaas.config.model import ComputeConfig, EnvironmentConfig, SensorConfig
 from aerodaas.config.options import Speed, current_options
 from aerodaas.config.plugins import load_plugin
-from aerodaas.dataflow.graph import Graph, NavigationEdge, application_line
+from aerodaas.dataflow.graph import Graph, NavigationEdge, application_line, refusal
 from aerodaas.dataflow.handles import Compute, Here, Sensor
 from aerodaas.dataflow.interfaces import IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
@@ -20,10 +20,10 @@ from aerodaas.environment.offering import BuildOnlyMission, note_built, offer
 from aerodaas.environment.robot import Robot
 from aerodaas.environment.run import Run
 from aerodaas.environment.source import EnvironmentSource
-from aerodaas.environment.waypoint_checks import require_actions
 from aerodaas.errors import ConfigError, GraphError, MissionError, UnknownIdError
 from aerodaas.identifiers import find_scoped
 from aerodaas.messages.waypoints import Waypoint
+from aerodaas.mission.action_executor import action_objection
 from aerodaas.mission.commands import AddNavigation, Command, End, initial_commands
 from aerodaas.runtime.checks import check_environment, sensor_properties
 from aerodaas.runtime.placement import Placement
@@ -376,7 +376,7 @@ class Environment(PaperNames, IEnvironment):
         Raises GraphError for what cannot be added in flight, MissionError for what the mission
         refuses.
         """
-        require_actions(self.config, edge)
+        _require_actions(self.config, edge)
         self._require_flying(edge.robot, edge.navigation)
         if self.graph.flying:
             for command in initial_commands([edge]):
@@ -484,7 +484,7 @@ class Environment(PaperNames, IEnvironment):
         robots = list(dict.fromkeys(named))
         if robots:
             for one in entries:
-                require_actions(self.config, _edge(_addressee(one, robots), one), one.line)
+                _require_actions(self.config, _edge(_addressee(one, robots), one), one.line)
             self.graph.navigation += [_edge(_addressee(one, robots), one) for one in entries]
             entries.clear()
 
@@ -519,3 +519,14 @@ def _edge(robot: str, entry: NavigationEntry) -> NavigationEdge:
     stream = entry.navigation.stream
     clear_on = stream.name if entry.clear_first and stream is not None else None
     return NavigationEdge(robot, entry.navigation, entry.index, entry.deadline, clear_on)
+
+
+def _require_actions(config: EnvironmentConfig, edge: NavigationEdge, line: str = "") -> None:
+    """Raise GraphError, by `line` or the line that calls, for actions that a robot cannot do."""
+    robot = next((one for one in config.robots if one.id == edge.robot), None)
+    if robot is None:
+        return
+    for waypoint in edge.navigation.waypoints:
+        if text := action_objection(waypoint, robot):
+            message = f"{edge.robot}: waypoint {waypoint.id!r}: {text}"
+            raise GraphError(f"{message}\n  at {line}") if line else refusal(message)

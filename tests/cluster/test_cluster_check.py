@@ -17,7 +17,7 @@ import pytest
 from required import needs, needs_root
 
 from aerodaas.actors.cluster.authentication import UNAUTHENTICATED
-from aerodaas.actors.cluster.probe import clock_offset
+from aerodaas.actors.cluster.check import clock_offset
 from aerodaas.errors import ConfigError
 from aerodaas.schedulers.lab.network import Network
 from tools.namespaces import EdgeCloud, Shape
