@@ -147,12 +147,7 @@ class Actuation(ActionExecutor):
             self._log.alert(now, _KIND, f"the actuators: {failure_line(error)}")
 
     def on_state(self, state: MissionState, now: int) -> None:
-        """Give its rest to all that has one, if the drone flies by no plan from now on.
-
-        Args:
-            state: The mission's state.
-            now: Mission clock, nanoseconds.
-        """
+        """Give its rest to all that has one, if the drone flies by no plan from now on."""
         begins, self._unplanned = state in _UNPLANNED and not self._unplanned, state in _UNPLANNED
         if not begins:
             return
@@ -206,17 +201,7 @@ class Actuation(ActionExecutor):
             self._failure = text
 
     def attend(self, stop: QueuedWaypoint, odometry: Odometry, now: int) -> bool:
-        """Do what is due for `stop`, at which the drone is.
-
-        Args:
-            stop: The stop whose moves are carried out.
-            odometry: Where the drone is.
-            now: Mission clock, nanoseconds.
-
-        Returns:
-            Whether the drone has to stay there for it; never for longer than the time-out of each
-            actuator.
-        """
+        """Move what is due at a stop; no actuator keeps the drone there beyond its time-out."""
         if stop.waypoint.action(MoveActuator) is None:
             return False
         task = self._tasks.get(stop.id)

@@ -210,12 +210,7 @@ class AutopilotHandover(Handover):
         return ""
 
     def take_back(self, reason: str, now: int) -> None:
-        """Let the drone fly by setpoints again, if the autopilot flies or is about to.
-
-        Args:
-            reason: Why, as the alert says it.
-            now: Mission clock, nanoseconds.
-        """
+        """Let the drone fly by setpoints again, if the autopilot flies or is about to."""
         if not self._stops:
             return
         if mode := self._mode():
@@ -226,16 +221,7 @@ class AutopilotHandover(Handover):
         self._flies = self._hovers = False
 
     def step(self, stops: Sequence[QueuedWaypoint], state: VehicleState, now: int) -> bool:
-        """Follow how far the hand-over is; a plan that has changed on the way is taken back.
-
-        Args:
-            stops: The stops as they are queued.
-            state: The vehicle's state.
-            now: Mission clock, nanoseconds.
-
-        Returns:
-            Whether the autopilot flies.
-        """
+        """Follow how far the hand-over is; a plan that has changed on the way is taken back."""
         mode = self._mode()
         if not self._stops or mode is None:
             return False
@@ -274,11 +260,6 @@ class AutopilotHandover(Handover):
         """The stops that were reached since the last turn, in order.
 
         Takes back what is not flown as it should be.
-
-        Args:
-            state: The vehicle's state; one without a position reaches nothing.
-            now: Mission clock, nanoseconds.
-            elapsed: Time since the last turn, seconds.
         """
         mode = self._mode()
         if mode is None or not self._flies or not has_position(state):

@@ -240,13 +240,7 @@ class Photographer(ActionExecutor):
         return "the gimbal is kept on a place" if looks else ""
 
     def steer(self, course: Course, odometry: Odometry, now: int) -> Course:
-        """Fly on the line of pictures, with the nose along it or towards the place in view.
-
-        Args:
-            course: Course to the stop; one that leads around something stays as it is.
-            odometry: Where the drone is, how it moves and where it faces.
-            now: Mission clock, nanoseconds.
-        """
+        """Fly on the line of pictures, with the nose along it or towards the place in view."""
         task, heading = self._served, self._point_of_interest.heading
         course = replace(course, heading=heading)
         if task is None or not np.array_equal(course.place, task.stop.waypoint.position):
@@ -259,13 +253,7 @@ class Photographer(ActionExecutor):
         return Course(ahead, bearing, brakes=not task.trigger.aligned)
 
     def stops_at(self, stop: QueuedWaypoint, following: QueuedWaypoint, radius: float) -> bool:
-        """Whether a picture by distance is due near the end of the leg, or the next leg takes some.
-
-        Args:
-            stop: The stop where the leg ends.
-            following: The stop after it.
-            radius: Distance from the leg's end, metres.
-        """
+        """Whether a picture by distance is due near the end of the leg, or on the next one."""
         coming = following.waypoint.action(TriggerPhotos)
         if coming is not None and coming.distance is not None:
             return True
