@@ -206,25 +206,6 @@ def test_rays_own_words_do_not_reach_the_terminal(tmp_path: Path) -> None:
         assert "worker" not in text
 
 
-@pytest.mark.parametrize(
-    ("ending", "message"),
-    [
-        ("raise KeyError('my own bug')", "KeyError: 'my own bug'\n  at app.py:13: raise"),
-        ("drone.get_sensor_by_id('nose')", "no sensor of drone is called 'nose'"),
-    ],
-    ids=["any exception", "an error of ours"],
-)
-def test_an_application_that_raises_in_flight(tmp_path: Path, ending: str, message: str) -> None:
-    """The drone lands, the recording is closed, and one message tells where it was raised."""
-    with running(tmp_path, ending) as process:
-        _, said = process.communicate(timeout=120)
-    assert message in said
-    assert said.count("error:") == 1
-    assert "Traceback" not in said
-    assert process.returncode in {1, 2}
-    landed(tmp_path)
-
-
 def test_an_application_that_leaves_the_cluster_first(tmp_path: Path) -> None:
     """There is nobody left to talk to: it ends, and starts no other Ray to look for its drone."""
     leaving = "import ray; ray.shutdown()"

@@ -138,17 +138,6 @@ def test_a_frame_is_sent_once_however_many_want_it(started: Callable[..., Execut
     desk.sites.finish(1.0)
 
 
-def test_uncompressed_where_that_is_asked_for(started: Callable[..., Executor]) -> None:
-    """The picture arrives bit by bit as it was."""
-    desk = Desk(started(one=Mean(), codec=Codec("none")))
-    desk.send("one", desk.frame())
-    (answer,) = desk.answers(1)
-    assert answer.way == "raw to cloud"
-    assert answer.figures is not None
-    assert answer.figures["sent_kb"] > 320 * 180 * 3 / 1e3
-    desk.sites.finish(1.0)
-
-
 def test_what_a_node_costs_becomes_known(started: Callable[..., Executor]) -> None:
     """Its link by pings before any frame, an analysis by its executions."""
     desk = Desk(started(slow=Mean(slow=0.3)))
