@@ -150,7 +150,7 @@ def _frame() -> None:
         session,
         "drone",
         (spec,),
-        InlinePlanner,
+        lambda spec: InlinePlanner(spec.scheduler),
         observed={_FRAMES: sensor.rate},
     )
     camera = CameraNode(session, _FRAMES, sensor, state, ends=False)

@@ -23,7 +23,7 @@ from aerodaas.errors import MissionError
 from aerodaas.messages.odometry import Odometry
 from aerodaas.service.flights.environment import rehearsal_config
 
-__all__ = ["FIELD", "Eastwards", "OtherLease", "Rehearsal", "rehearse", "survey", "to_the_east"]
+__all__ = ["FIELD", "Eastwards", "Rehearsal", "rehearse", "survey", "to_the_east"]
 
 FIELD: dict[str, Any] = {
     "name": "field",
@@ -32,14 +32,6 @@ FIELD: dict[str, Any] = {
     "simulation": {"world": "empty"},
 }
 """One drone in still air."""
-
-
-@dataclass(frozen=True)
-class OtherLease:
-    """Area of another lease."""
-
-    id: str
-    area: list[tuple[float, float]]
 
 
 @dataclass(frozen=True)

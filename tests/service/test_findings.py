@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import pytest
-from rehearsed import OtherLease
 
 from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.recording.report.flight import Band, RecordedFlight, RobotFlight
+from aerodaas.service.flights.orders import OtherLease
 from aerodaas.service.rehearsal.findings import Finding, findings_of
 
 FENCE = {"polygon": [[-20, -20], [20, -20], [20, 20], [-20, 20]], "ceiling": 30}
@@ -121,7 +121,7 @@ def test_the_battery_keeps_its_reserve() -> None:
 def box(west: float, south: float) -> OtherLease:
     """Another's lease of 4 m by 4 m."""
     corners = [(west, south), (west + 4, south), (west + 4, south + 4), (west, south + 4)]
-    return OtherLease("b7", corners)
+    return OtherLease(id="b7", area=corners)
 
 
 def test_other_leases_are_kept_away_from() -> None:

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from flying import Flyer
-from rehearsed import OtherLease, rehearse, to_the_east
+from rehearsed import rehearse, to_the_east
 
 from aerodaas.config.model import validated
 from aerodaas.drivers.simulated import SimulatedVehicle
@@ -17,11 +17,12 @@ from aerodaas.errors import ConfigError
 from aerodaas.messages.health import Verdict
 from aerodaas.mission.safety.checklist import Checklist
 from aerodaas.service.flights.environment import rehearsal_config
+from aerodaas.service.flights.orders import OtherLease
 from aerodaas.service.rehearsal.findings import judge
 from aerodaas.service.rehearsal.picture import draw
 from aerodaas.simulation.airframe import Airframe
 
-AHEAD = OtherLease("b7", [(5.0, 4.0), (9.0, 4.0), (9.0, 9.0), (5.0, 9.0)])
+AHEAD = OtherLease(id="b7", area=[(5.0, 4.0), (9.0, 4.0), (9.0, 9.0), (5.0, 9.0)])
 """Another's area around the second waypoint."""
 FLEET: dict[str, Any] = {
     "name": "fleet",
