@@ -459,7 +459,7 @@ class Mission:
     def _protect(self, state: VehicleState) -> None:
         before, self._assessment = self._assessment, self._supervisor.assess(state, self._now)
         demand, reason = self._assessment.action, self._assessment.gravest.text
-        for fault in self._assessment.news(before):
+        for fault in self._assessment.new_findings(before):
             self._log.alert(self._now, fault.kind, fault.text, fault.about)
         if self._supervisor.taken_over(self._now) is not None:
             return

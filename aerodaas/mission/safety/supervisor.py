@@ -44,7 +44,7 @@ class Assessment:
         """The failsafe action demanded now."""
         return self.gravest.demand
 
-    def news(self, before: Assessment) -> list[Fault]:
+    def new_findings(self, before: Assessment) -> list[Fault]:
         """The faults that are to be told: those that there were not `before`.
 
         A takeover is told as soon as it is settled why (`Supervisor.taken_over`).

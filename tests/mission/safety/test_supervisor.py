@@ -15,9 +15,9 @@ from aerodaas.geometry.energy import EnergyMeter, EnergyModel
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.vehicle import VehicleMode, VehicleState, VelocitySetpoint
 from aerodaas.mission.motion_requests import Fly
-from aerodaas.mission.safety.failsafe import FailsafeAction
+from aerodaas.mission.safety.failsafe import FailsafeAction, Fault
 from aerodaas.mission.safety.geofence import Geofence
-from aerodaas.mission.safety.supervisor import CALM, Supervisor
+from aerodaas.mission.safety.supervisor import CALM, Assessment, Supervisor
 
 LIMITS = LimitsConfig(battery_return=0.25, battery_land=0.125, link_timeout=3.0)
 FENCE = GeofenceConfig(polygon=[(-50, -50), (50, -50), (50, 50), (-50, 50)])
@@ -249,3 +249,26 @@ def test_the_height_of_a_take_off_is_within_the_fence(
     meter = EnergyMeter(EnergyModel(limits.endurance, np.zeros(3)))
     reasons = Supervisor(limits, np.zeros(3), fence, meter).objections(grounded())
     assert reasons == [] if ready else "leaves the geofence's heights" in reasons[0]
+
+
+_NEAR = Fault(FailsafeAction.NOTHING, "traffic", "a1 is 40 m away", "a1")
+_ENGINE = Fault(FailsafeAction.NOTHING, "vehicle", "motor 3 is hot")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        (_NEAR, replace(_NEAR, text="a1 is 30 m away"), False),
+        (_NEAR, replace(_NEAR, about="a2"), True),
+        (_NEAR, replace(_NEAR, kind="separation"), True),
+        (_ENGINE, replace(_ENGINE, text="motor 4 is hot"), False),
+        (_ENGINE, replace(_ENGINE, text="the gyroscope is lost"), True),
+        (_ENGINE, replace(_ENGINE, kind="wind"), True),
+    ],
+)
+def test_a_fault_is_new_by_its_kind_and_by_what_it_is_about(
+    before: Fault, after: Fault, *, told: bool
+) -> None:
+    """Numbers that change raise no second alert; the vehicle's own faults differ by their words."""
+    found = Assessment(after, (after,)).new_findings(Assessment(before, (before,)))
+    assert found == ([after] if told else [])
