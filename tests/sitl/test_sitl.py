@@ -90,7 +90,8 @@ def test_a_height_above_the_sea(autopilot: Autopilot) -> None:
         assert answer.accepted, answer.text
         finish(flight)
         assert list(flight.status.visited) == ["high"]
-        assert 7.0 < flight.relay.witness.highest < 9.0
+        # The estimate of PX4 that has just started lags the truth by a metre in a climb.
+        assert 7.0 < flight.relay.witness.highest < 9.5
         flight.tell_outcome(f"8 m up, said as {place.z:.1f} m above the sea")
 
 
