@@ -45,6 +45,7 @@ from rich.progress import Progress
 from aerodaas import Environment
 from aerodaas.config.options import RunOptions, current_options
 
+_DORA = Path(sys.executable).with_name("dora")
 _DORA_NODE = Path(__file__).parent / "_latency_dora.py"
 _WARM_UP = 3.0
 UNITS = {"median": "ms", "p99": "ms", "cpu": "% of a core", "frames": ""}
@@ -141,9 +142,8 @@ def measure_dora(seconds: float, folder: Path) -> Round:
     ]
     flow = folder / "dataflow.yml"
     flow.write_text(json.dumps({"nodes": nodes}), encoding="utf-8")  # JSON is YAML, too
-    dora = str(Path(sys.executable).parent / "dora")
     with subprocess.Popen(  # noqa: S603 - our own command
-        [dora, "run", str(flow)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        [str(_DORA), "run", str(flow)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     ) as process:
         time.sleep(_WARM_UP)
         system = _processes(psutil.Process(process.pid))
@@ -215,6 +215,8 @@ def main(
 
     python benchmarks/latency.py --seconds 10 --rounds 3 --json latency.json
     """
+    if dora and not _DORA.is_file():
+        raise typer.BadParameter("dora is missing: pip install -e '.[benchmarks]', or give --no-dora")
     title = f"capture to command, {WIDTH}x{HEIGHT} at {RATE}/s, camera-analytics-navigation-drone"
     packages = ("ray", *(("dora-rs",) if dora else ()))
     report = Report(title, UNITS, packages=packages)
