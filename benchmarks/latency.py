@@ -216,7 +216,8 @@ def main(
     python benchmarks/latency.py --seconds 10 --rounds 3 --json latency.json
     """
     if dora and not _DORA.is_file():
-        raise typer.BadParameter("dora is missing: pip install -e '.[benchmarks]', or give --no-dora")
+        remedy = "pip install -e '.[benchmarks]', or give --no-dora"
+        raise typer.BadParameter(f"dora is missing: {remedy}")
     title = f"capture to command, {WIDTH}x{HEIGHT} at {RATE}/s, camera-analytics-navigation-drone"
     packages = ("ray", *(("dora-rs",) if dora else ()))
     report = Report(title, UNITS, packages=packages)
