@@ -8,7 +8,7 @@ import time
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerodaas.actors.drone.actor import _MOST_WAITING, BackgroundPublisher
+from aerodaas.actors.drone.background_publisher import _MOST_WAITING, BackgroundPublisher
 
 
 @settings(max_examples=20)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import ConfigError
 from aerodaas.schedulers.lab import Workload, load_workload, read_arrivals
 from aerodaas.schedulers.lab.arrival_trace import TRACE
 
@@ -22,6 +24,7 @@ __all__ = [
     "names_of",
     "workload_of",
     "write_csv",
+    "writing_into",
 ]
 
 WORKLOAD = "3D-A"
@@ -73,3 +76,12 @@ def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
+
+
+@contextmanager
+def writing_into(folder: Path) -> Iterator[None]:
+    """Raise ConfigError where nothing can be written into a folder."""
+    try:
+        yield
+    except OSError as error:
+        raise ConfigError(f"cannot write into {folder}: {error.strerror}") from None

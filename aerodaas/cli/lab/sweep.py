@@ -20,6 +20,7 @@ from aerodaas.cli.lab.options import (
     names_of,
     workload_of,
     write_csv,
+    writing_into,
 )
 from aerodaas.config.extras import has_extra
 from aerodaas.errors import ConfigError, UnknownIdError
@@ -200,12 +201,10 @@ def _advise(result: SweepResult) -> None:
 
 def _write(result: SweepResult, out: Path) -> list[str]:
     """Write the tidy table, and the summary of each figure; returns the files' names."""
-    try:
+    with writing_into(out):
         out.mkdir(parents=True, exist_ok=True)
         write_csv(out / _CSV, result.rows)
         write_csv(out / _SUMMARY, [row for name in result.figures for row in result.summary(name)])
-    except OSError as error:
-        raise ConfigError(f"cannot write into {out}: {error.strerror}") from None
     try:
         import pyarrow as pa  # noqa: PLC0415 - an extra
         from pyarrow import parquet  # noqa: PLC0415

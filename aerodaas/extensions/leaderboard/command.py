@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 import aerodaas
-from aerodaas.cli.lab.options import Jobs, write_csv
+from aerodaas.cli.lab.options import Jobs, write_csv, writing_into
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.leaderboard.ranking import (
     CASES,
@@ -89,7 +89,8 @@ def rank(names: Sequence[str], extent: Extent, *, jobs: int | None, out: Path) -
         raise ConfigError("--only needs a --scheduler")
     ideas = {name: _idea(name) for name in names}
     # A folder that cannot be written to is told now, not after minutes.
-    _writing(out, lambda: out.mkdir(parents=True, exist_ok=True))
+    with writing_into(out):
+        out.mkdir(parents=True, exist_ok=True)
     began = perf_counter()
     with show_progress() as progress:
         bar = progress.add_task("sample paths", total=None)
@@ -102,8 +103,9 @@ def rank(names: Sequence[str], extent: Extent, *, jobs: int | None, out: Path) -
     page, table = out / "leaderboard.html", out / "leaderboard.csv"
     text = html_page(board, ideas, _origin(perf_counter() - began))
     _show(board)
-    _writing(out, lambda: page.write_text(text, encoding="utf-8"))
-    _writing(out, lambda: write_csv(table, board.rows()))
+    with writing_into(out):
+        page.write_text(text, encoding="utf-8")
+        write_csv(table, board.rows())
     typer.echo(f"in {out}: {page.name}, {table.name}")
 
 
@@ -150,13 +152,6 @@ def _idea(name: str) -> str:
     """The first line of a scheduler's docstring; raises what loading it does."""
     lines = (type(load_scheduler(name)).__doc__ or "").strip().splitlines()
     return lines[0] if lines else ""
-
-
-def _writing(out: Path, write: Callable[[], Any]) -> None:
-    try:
-        write()
-    except OSError as error:
-        raise ConfigError(f"cannot write into {out}: {error.strerror}") from None
 
 
 def _show(board: Leaderboard) -> None:

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["best_class", "boxes_and_scores", "corners", "listed", "sigmoid"]
-
-_AXES, _BOX = 3, 4
+__all__ = ["best_class", "corners", "listed"]
 
 
 def corners(centred: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -59,22 +55,3 @@ def listed(
     kept = np.flatnonzero(enough & known)
     invalid = int(np.count_nonzero(np.isnan(scores) | (enough & ~known)))
     return kept, scores[kept], classes[kept].astype(np.int32), invalid
-
-
-def boxes_and_scores(shapes: Sequence[tuple[int, ...]]) -> tuple[int, int] | None:
-    """Find which of two outputs is boxes [batch, n, 4] and which scores [batch, n, classes].
-
-    Where there are four classes, the boxes come first. None for any other shapes.
-    """
-    pair = 2
-    if len(shapes) != pair or any(len(shape) != _AXES for shape in shapes):
-        return None
-    if shapes[0][:2] != shapes[1][:2] or not all(shape[2] for shape in shapes):
-        return None
-    found = next((number for number, shape in enumerate(shapes) if shape[2] == _BOX), None)
-    return None if found is None else (found, 1 - found)
-
-
-def sigmoid(logits: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Logistic function, without overflow."""
-    return np.asarray(0.5 * (1 + np.tanh(0.5 * logits)), np.float32)

@@ -17,13 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.detection.coco import COCO_NAMES
-from aerodaas.analytics.detection.families.arrays import (
-    best_class,
-    boxes_and_scores,
-    corners,
-    listed,
-    sigmoid,
-)
+from aerodaas.analytics.detection.families.arrays import best_class, corners, listed
 from aerodaas.analytics.detection.families.base import Candidates, Preprocessing, keep_finite
 from aerodaas.analytics.detection.model_file import ModelFile
 
@@ -69,7 +63,7 @@ class RtDetrDecoder:
                 boxes, scores = outputs[0][:, :_BOX], outputs[0][:, _BOX:]
             else:
                 boxes, scores = (outputs[number] for number in self.separate)
-            found = best_class((sigmoid(scores) if self.logits else scores).T, min_score)
+            found = best_class((_sigmoid(scores) if self.logits else scores).T, min_score)
         kept, best, classes, invalid = found
         height, width = size
         pixels = corners(boxes[kept, :_BOX]) * np.array([width, height, width, height], np.float32)
@@ -81,7 +75,7 @@ def rtdetr(model: ModelFile) -> RtDetrDecoder | None:
     if not _may_be(model):
         return None
     shapes = [output.shape for output in model.trial]
-    separate = boxes_and_scores(shapes)
+    separate = _boxes_and_scores(shapes)
     if separate is not None:
         boxes, scores = (model.trial[number][0] for number in separate)
     elif len(shapes) == 1 and len(shapes[0]) == _AXES:
@@ -123,3 +117,22 @@ def _may_be(model: ModelFile) -> bool:
     queries = {shape[1] for shape in shapes if len(shape) == _AXES}
     few = all(count is None or 1 <= count <= _MOST_QUERIES for count in queries)
     return len(shapes) in (1, 2) and len(queries) == 1 and few
+
+
+def _boxes_and_scores(shapes: Sequence[tuple[int, ...]]) -> tuple[int, int] | None:
+    """Find which of two outputs is boxes [batch, n, 4] and which scores [batch, n, classes].
+
+    Where there are four classes, the boxes come first. None for any other shapes.
+    """
+    pair = 2
+    if len(shapes) != pair or any(len(shape) != _AXES for shape in shapes):
+        return None
+    if shapes[0][:2] != shapes[1][:2] or not all(shape[2] for shape in shapes):
+        return None
+    found = next((number for number, shape in enumerate(shapes) if shape[2] == _BOX), None)
+    return None if found is None else (found, 1 - found)
+
+
+def _sigmoid(logits: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Logistic function, without overflow."""
+    return np.asarray(0.5 * (1 + np.tanh(0.5 * logits)), np.float32)
