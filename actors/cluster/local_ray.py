@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 import threading
+from importlib.util import find_spec
 from pathlib import Path
 from queue import Empty, Queue
 
@@ -34,6 +35,10 @@ _OPTIONS = (
     *("--head", f"--node-ip-address={LOOPBACK}"),
     *("--include-dashboard=false", "--include-log-monitor=false", "--disable-usage-stats"),
     *(f"--object-store-memory={_STORE_BYTES}", '--resources={"edge": 1, "cloud": 1}'),
+    # By default two Rays would quarrel over one port.
+    "--dashboard-port=",
+    # Ray opens this one only with the packages of ray[client], and refuses it without.
+    *(["--ray-client-server-port="] if find_spec("grpc") else []),
 )
 
 

@@ -52,8 +52,6 @@ _LOOK_SECONDS = 0.2
 _LONGEST = 40
 """Most characters of a temporary folder; a socket's path below it may have 107."""
 _SUBREAPER = 36
-_PORTS = ("--dashboard-port", "--ray-client-server-port")
-"""Options of `ray start` for ports that are fixed by default: two Rays would quarrel over them."""
 RAY = """
 import sys
 from importlib.metadata import entry_points
@@ -70,7 +68,7 @@ def main(application: int, streams: str, words: list[str]) -> None:
     Args:
         application: Id of the application's process.
         streams: Folder of its streams' sockets; empty without.
-        words: Arguments of `ray start`.
+        words: Arguments of `ray start`; one that ends with `=` gets the number of a free port.
     """
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
@@ -147,8 +145,10 @@ class _Client:
 def _start(client: _Client, folder: Path, words: list[str]) -> tuple[str, str]:
     """Run `ray start`; returns Ray's address and "", or "" and the reason of the failure."""
     own = folder / _RAYS_OWN
-    port, *others = _free_ports(len(_PORTS) + 1)
-    words = [*words, f"--port={port}", *map("{}={}".format, _PORTS, others)]
+    port, *others = _free_ports(1 + sum(word.endswith("=") for word in words))
+    free = iter(others)
+    words = [f"{word}{next(free)}" if word.endswith("=") else word for word in words]
+    words.append(f"--port={port}")
     command = [sys.executable, "-c", RAY, "start", f"--temp-dir={own}", *words]
     with (folder / "start.log").open("w+") as log:
         starting = subprocess.Popen(  # noqa: S603 - fixed arguments

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -24,6 +25,24 @@ def test_what_ray_said_last_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     ray = LocalRay()
     with pytest.raises(AeroDaaSError, match=r"does not start on this machine:(?s:.*)encodings"):
         _ = ray.address
+
+
+def test_it_starts_without_the_packages_of_rays_client(tmp_path: Path) -> None:
+    """As `pip install aerodaas` leaves it: gRPC comes with extras of Ray only."""
+    (tmp_path / "sitecustomize.py").write_text("import sys\nsys.modules['grpc'] = None\n")
+    code = (
+        "from aerodaas.actors.cluster.local_ray import LocalRay\n"
+        "ray = LocalRay()\nprint(ray.address)\nray.end()"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        check=False,
+        text=True,
+    )
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.startswith("127.0.0.1:")
 
 
 def test_what_stopped_the_supervisor_is_told() -> None:
