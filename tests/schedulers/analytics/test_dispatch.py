@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 
 import pytest
@@ -117,6 +118,26 @@ def test_the_cloud_queue_keeps_order_and_gives_up_at_the_latest_start() -> None:
     ends = {r.task.id: r.outcome for r in host.results}
     assert ends == {0: TaskOutcome.DONE, 1: TaskOutcome.DONE, 2: TaskOutcome.DROPPED}
     assert [r.task.id for r in scheduler.heard] == [0, 2, 1]
+
+
+def test_a_crowd_that_gives_up_at_once_ends_one_by_one() -> None:
+    """A thousand tasks wait for one slot until it is too late for all of them."""
+    crowd = 1000
+    scheduler = _Scripted(*([lambda t, _: SendToCloud(t, "", 10)] * crowd))
+    dispatch, host = _dispatch_of(scheduler)
+    tasks = [_task(number) for number in range(crowd)]
+    for one in tasks:
+        dispatch.arrived(one, 0)
+    dispatch.finished(tasks[0], 50)
+    assert [r.task.id for r in host.results] == list(range(crowd))
+    assert Counter(r.outcome for r in host.results)[TaskOutcome.DROPPED] == crowd - 1
+    assert sorted(r.task.id for r in scheduler.heard) == list(range(crowd))
+
+
+def test_what_never_ran_costs_nothing() -> None:
+    """Whatever its end is called."""
+    one = Result(_task(0), TaskOutcome.FAILED, TaskPlace.NOWHERE, 5, 5)
+    assert one.utility == 0
 
 
 def test_results_after_the_deadline_are_late_and_cost_their_price() -> None:
@@ -336,6 +357,15 @@ def test_a_scheduler_is_told_the_time_of_each_event_and_of_idleness_only_with_wo
     assert [(r.task.id, r.started, r.finished) for r in host.results] == [(0, 1, 6), (2, 4, 7)]
 
 
+def test_a_dropped_task_ran_nowhere() -> None:
+    """Neither place is to blame, and it ended when it was given up."""
+    dispatch, host = _dispatch_of(_Scripted(lambda t, _: Drop(t)))
+    dispatch.arrived(_task(0), 3)
+    (end,) = host.results
+    assert (end.outcome, end.place) == (TaskOutcome.DROPPED, TaskPlace.NOWHERE)
+    assert (end.started, end.finished) == (3, 3)
+
+
 @pytest.mark.parametrize(("at", "place"), [(80, "cloud"), (81, "nowhere")])
 def test_an_executor_that_is_down_leaves_the_cloud_until_the_last_moment(
     at: int, place: str
@@ -390,6 +420,13 @@ def test_an_idle_executor_is_offered_when_the_resources_or_the_scheduler_change(
     dispatch.replace(another, 6)
     assert another.told == [("start", 6), ("arrived", 6)]
     assert host.decided_at == [6]
+
+
+def test_a_wake_up_in_the_past_is_refused_with_its_time() -> None:
+    """As it was decided."""
+    dispatch, _ = _dispatch_of(_Scripted(lambda _, __: WakeAt(9)))
+    with pytest.raises(SchedulerError, match=r"_Scripted decided WakeAt\(at=9.*now is 10"):
+        dispatch.arrived(_task(0, 10), 10)
 
 
 def test_a_scheduler_that_answers_nothing_is_named() -> None:

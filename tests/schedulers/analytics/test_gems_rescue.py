@@ -11,7 +11,9 @@ from aerodaas.schedulers.analytics.base import (
     Profile,
     QoeGoal,
     Resources,
+    SendToCloud,
     Task,
+    WakeAt,
 )
 from aerodaas.schedulers.analytics.published.gems import Gems
 from aerodaas.testing.scheduler_kit import End, play
@@ -59,6 +61,22 @@ def test_only_what_gains_in_the_cloud_is_rescued(cost: float, place: str) -> Non
     assert ends[1].place == place
 
 
+def test_without_a_cloud_nothing_is_rescued() -> None:
+    """It waits for the edge, in danger or not."""
+    tasks = [(0.0, BLOCK), (0.0, _m(900)), (10.0, _m(HOPELESS))]
+    ends = play(Gems(), tasks, resources=Resources(cloud_slots=0))
+    assert ends[1] == End("edge", "done", 50, 150)
+
+
+def test_all_waiting_tasks_of_the_model_are_rescued_and_no_other_models() -> None:
+    """Two of m leave at the drop; the one of another model, between them, stays."""
+    other = Profile("n", 100, 800 * MILLISECOND, 100 * MILLISECOND, 300 * MILLISECOND, 1, 20)
+    ends = play(Gems(), [(0, BLOCK), (0, _m(900)), (0, other), (0, _m(700)), (10, _m(HOPELESS))])
+    assert ends[1] == End("cloud", "done", 10, 310)
+    assert ends[3] == End("cloud", "done", 10, 310)
+    assert ends[2] == End("edge", "done", 50, 150)
+
+
 def test_a_late_result_counts_against_its_model() -> None:
     """The first task ends late on the edge, at 150, and the one that waits leaves then."""
     tasks = [(0.0, _m(120)), (0.0, _m(900)), (0.0, _m(900))]
@@ -79,6 +97,31 @@ def test_windows_are_whole_multiples_of_their_length(at: int) -> None:
     early = Task(1, hopeless, 990 * MILLISECOND, 1030 * MILLISECOND)
     assert [type(one) for one in gems.task_arrived(early, early.arrival)] == [Drop]
     assert gems._in_danger(Task(2, waiting, 0, 2**62), at * MILLISECOND) == (at == 999)
+
+
+def test_the_reason_of_a_drop_is_kept() -> None:
+    """GEMS counts it, and passes it on."""
+    gems = Gems()
+    gems.start(Resources(), 0)
+    task = Task(1, _m(900), 0, 900)
+    assert gems.drop(task, 5, "too late") == Drop(task, "too late")
+
+
+def test_a_drop_at_its_turn_on_the_edge_rescues() -> None:
+    """The block takes 100, not 50: the next can't end by 160; of those behind, one runs at once."""
+    tasks = [(0.0, BLOCK), (0.0, _m(160)), (0.0, _m(900)), (0.0, _m(901))]
+    ends = play(Gems(), tasks, edge_ms=[100, 100, 100, 100])
+    assert ends[1] == End("nowhere", "dropped", 100, 100)
+    assert ends[2] == End("edge", "done", 100, 200)
+    assert ends[3] == End("cloud", "done", 100, 400)
+
+
+def test_a_drop_at_its_latest_start_rescues() -> None:
+    """Not stolen until 690, one that would lose money in the cloud is dropped."""
+    long = Profile("long", 100, 2000 * MILLISECOND, 800 * MILLISECOND, 300 * MILLISECOND, 1, 20)
+    ends = play(Gems(), [(0, long), (1, _m(800, cost=110)), (2, _m(1500))])
+    assert ends[1] == End("nowhere", "dropped", 691, 691)
+    assert ends[2] == End("cloud", "done", 691, 991)
 
 
 def test_as_published_the_cloud_s_times_are_not_learnt() -> None:
@@ -105,3 +148,13 @@ def test_as_published_nothing_is_stolen_for_an_empty_queue() -> None:
     tasks = [(0.0, long), (0.0, _m(900))]
     assert play(Gems(published=True), tasks, edge_ms=[300, 100])[1].started == 590
     assert play(Gems(), tasks, edge_ms=[300, 100])[1] == End("edge", "done", 300, 400)
+
+
+@pytest.mark.parametrize("published", [False, True])
+def test_the_reason_to_leave_for_the_cloud_is_kept(published: bool) -> None:  # noqa: FBT001
+    """At its latest start the task is sent for the reason for which it had waited."""
+    gems = Gems(published=published)
+    gems.start(Resources(), 0)
+    task = Task(1, _m(600), 0, 600 * MILLISECOND)
+    assert list(gems.to_cloud(task, 0, "why")) == [WakeAt(290 * MILLISECOND)]
+    assert list(gems.timer(290 * MILLISECOND)) == [SendToCloud(task, "why", 300 * MILLISECOND)]

@@ -14,8 +14,12 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     Profile,
+    QoeGoal,
     Resources,
+    Result,
     Task,
+    TaskOutcome,
+    TaskPlace,
 )
 from aerodaas.schedulers.analytics.estimates import TimeEstimate, TimeEstimates, chance
 from aerodaas.schedulers.analytics.forecast import Forecast
@@ -23,6 +27,7 @@ from aerodaas.schedulers.analytics.margin import Margin
 from aerodaas.schedulers.analytics.outlook import CloudOutlook
 from aerodaas.schedulers.analytics.planner import Job, JobQueue, plan
 from aerodaas.schedulers.analytics.published.profiles import PUBLISHED
+from aerodaas.schedulers.analytics.quality import QualityWatch
 from aerodaas.schedulers.lab.network import Network
 from aerodaas.testing.scheduler_kit import End, play
 
@@ -39,6 +44,17 @@ def test_beliefs_learn_mean_and_spread() -> None:
     belief = beliefs.belief(HV)
     assert belief.mean == pytest.approx(200 * MILLISECOND, rel=0.05)
     assert belief.sigma == pytest.approx(20 * MILLISECOND, rel=0.4)
+
+
+def test_the_shared_delay_of_one_model_tells_about_the_others() -> None:
+    """A network that adds 100 ms is learned from HV alone and believed of MD."""
+    beliefs = TimeEstimates(shared=True)
+    for number in range(60):
+        taken = HV.cloud_time + 100 * MILLISECOND * (number >= 20)
+        beliefs.observe(HV, taken, number * NANOSECONDS // 4)
+    assert beliefs.belief(MD).mean == pytest.approx(
+        MD.cloud_time + 100 * MILLISECOND, abs=15 * MILLISECOND
+    )
 
 
 @given(st.floats(1, 1000), st.floats(0.1, 100), st.floats(-2000, 2000), st.floats(0, 500))
@@ -106,6 +122,37 @@ def test_a_wide_beam_finds_the_best_plan(jobs: list[tuple[int, int, int]], price
         assert merit == pytest.approx(_best_by_enumeration(lanes, 0.0, 1000))
 
 
+def test_a_plan_waits_for_a_better_job_only_if_the_gap_allows() -> None:
+    """A long cheap job now, or a dear one that arrives in 50 and must start at once."""
+    cheap = JobQueue(TimeEstimate(100, 1e-6), [Job("cheap", 0, 1000, 5, 0)])
+    dear = JobQueue(TimeEstimate(100, 1e-6), [Job("dear", 50, 150, 100, 0)])
+    patient = plan([cheap, dear], 0, 300, 0.01, width=8, gap=60)
+    assert [job.what for _, _, job in patient] == ["dear", "cheap"]
+    assert patient[0][0] == 50
+    hasty = plan([cheap, dear], 0, 300, 0.01, width=8, gap=40)
+    assert [job.what for _, _, job in hasty] == ["cheap"]
+
+
+def test_quality_is_worth_most_in_the_balance() -> None:
+    """Nothing once the bonus is safe or lost; much when one success decides."""
+    watch = QualityWatch(QoeGoal(100, 0.9, 1000))
+    for at in range(10):
+        watch.arrival(at)
+    watch.success = 0.5
+    for at in range(8):
+        watch.ended(at, in_time=True)
+    in_balance = watch.worth()
+    watch.ended(8, in_time=True)
+    assert in_balance > 20
+    assert watch.worth() == 0
+    lost = QualityWatch(QoeGoal(100, 0.9, 1000))
+    for at in range(10):
+        lost.arrival(at)
+    for at in range(2):
+        lost.ended(at, in_time=False)
+    assert lost.worth() == 0
+
+
 def _outlook(slots: int = 32) -> CloudOutlook:
     outlook = CloudOutlook()
     outlook.resources = Resources(cloud_slots=slots)
@@ -123,6 +170,33 @@ def test_the_cloud_is_worth_its_chance() -> None:
     assert outlook.value(HV, HV.cloud_time // 2) == 0
     assert outlook.value(PUBLISHED["BP"], NANOSECONDS) == 0
     assert outlook.value(PUBLISHED["BP"], NANOSECONDS, bonus=13) == pytest.approx(10, abs=0.5)
+
+
+def test_waiting_pays_less_the_less_it_can_win() -> None:
+    """Patience ends earlier (at more room) where little or nothing can be won by waiting."""
+    outlook = _outlook()
+    rates = [1e-9 * worth for worth in (0.1, 1, 10, 100)]
+    rooms = [outlook.patience(HV, 1.0, rate) for rate in rates]
+    assert rooms == sorted(rooms, reverse=True)
+    assert rooms[0] > rooms[-1]
+
+
+def test_a_silent_cloud_is_avoided_until_it_answers() -> None:
+    """Two overdue answers in a row silence it; an answer to a later question revives it."""
+    outlook = _outlook()
+    for number in range(3):
+        outlook.sent(_task(number), number)
+    outlook.listen(300 * MILLISECOND)
+    assert outlook.value(HV, HV.deadline) > 90
+    outlook.listen(800 * MILLISECOND)
+    assert outlook.silent_since == 800 * MILLISECOND
+    assert outlook.value(HV, HV.deadline) == 0
+    probe = _task(9)
+    sent, back = 1900 * MILLISECOND, 2300 * MILLISECOND
+    assert outlook.wants_probe(sent)
+    outlook.sent(probe, sent)
+    outlook.finished(Result(probe, TaskOutcome.DONE, TaskPlace.CLOUD, sent, back), back)
+    assert outlook.value(HV, HV.deadline) > 90
 
 
 def test_crowded_slots_go_to_the_best() -> None:

@@ -7,6 +7,7 @@ from statistics import NormalDist
 
 import pytest
 
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     STOLEN,
@@ -20,9 +21,11 @@ from aerodaas.schedulers.analytics.base import (
     TaskPlace,
 )
 from aerodaas.schedulers.analytics.estimates import TimeEstimate, TimeEstimates
+from aerodaas.schedulers.analytics.forecast import Forecast
 from aerodaas.schedulers.analytics.margin import Margin
 from aerodaas.schedulers.analytics.outlook import CloudOutlook
 from aerodaas.schedulers.analytics.planner import Job, JobQueue, plan
+from aerodaas.schedulers.analytics.published.cloud_only import CloudOnly
 from aerodaas.schedulers.analytics.quality import QualityWatch
 from aerodaas.testing.scheduler_kit import play
 
@@ -73,6 +76,38 @@ def test_estimates_never_stop_following() -> None:
     assert beliefs.belief(M).mean / MS == pytest.approx(202)
 
 
+def test_the_fourth_regular_arrival_is_the_first_to_be_forecast_from() -> None:
+    """Of arrivals every 100, the third gap makes three that agree."""
+    forecast = Forecast()
+    forecasts = []
+    for at in (0, 100, 200, 300):
+        forecast.arrived("drone", at)
+        forecasts.append(list(forecast.due(at, 10_000)))
+    assert forecasts == [[], [], [], [(400, "drone")]]
+
+
+@pytest.mark.parametrize("cost", ["edge_cost", "cloud_cost"])
+@pytest.mark.parametrize("value", [-0.1, float("inf"), float("nan")])
+def test_costs_that_cannot_be_are_refused(cost: str, value: float) -> None:
+    """The message names the model and the cost."""
+    with pytest.raises(SchedulerError, match=f"'m': {cost} must not be negative"):
+        Profile("m", 100, 10, 1, 1, *((value, 0) if cost == "edge_cost" else (0, value)))
+
+
+def test_a_small_gain_and_a_short_time_out_are_allowed() -> None:
+    """Half a unit on one of the two, and a nanosecond; a gain of nothing on both is not."""
+    assert Profile("m", 100, 10, 1, 1, 99.5, 200).edge_gain == 0.5
+    assert Resources(cloud_timeout=1).cloud_timeout == 1
+    with pytest.raises(SchedulerError, match="would never run"):
+        Profile("m", 100, 10, 1, 1, 100, 100)
+
+
+def test_no_more_tasks_than_slots_are_in_the_cloud_at_once() -> None:
+    """Of five at once in two slots, the last starts third."""
+    ends = play(CloudOnly(), [(0, M)] * 5, resources=Resources(cloud_slots=2))
+    assert [end.started for end in ends] == [0, 0, 200, 200, 400]
+
+
 def watch(total: int, done: int, missed: int, success: float = 0.9) -> QualityWatch:
     """A window of 1000 with these counts, 90 % of which must be in time for a bonus of 100."""
     counting = QualityWatch(QoeGoal(100, 0.9, 1000))
@@ -106,6 +141,14 @@ def test_a_success_is_worth_the_chance_that_it_decides(
     assert watch(total, done, missed, success).worth() == pytest.approx(100 * exact, abs=6)
 
 
+def test_where_all_the_rest_must_succeed_each_is_worth_much() -> None:
+    """Ten, eight in time, one missed: the last decides. With two missed, nothing does any more."""
+    assert watch(10, 8, 1).worth() > 60
+    assert watch(10, 7, 1).worth() > 60
+    assert watch(10, 8, 2).worth() == 0
+    assert watch(10, 9, 0).worth() == 0
+
+
 def test_a_window_is_forecast_from_the_one_before() -> None:
     """One arrival after ten just before is taken for the first of ten; after a pause it is not."""
     after_ten = watch(10, 9, 1)
@@ -126,6 +169,13 @@ def test_what_ends_in_a_later_window_counts_for_the_rate_of_success_alone() -> N
     one.ended(1000, in_time=True)
     assert one.success == pytest.approx(0.86225)
     assert (one.done, one.missed) == (1, 0)
+
+
+def test_without_a_bonus_a_success_is_worth_no_more() -> None:
+    """A goal may be counted without being paid for."""
+    plain = QualityWatch(QoeGoal(0, 0.9, 1000))
+    plain.arrival(0)
+    assert plain.worth() == 0
 
 
 def outlook(slots: int, under_way: int = 0) -> CloudOutlook:
@@ -154,6 +204,17 @@ def test_waiting_ends_where_it_wins_as_much_as_it_loses(rate: float) -> None:
     density = NormalDist(belief.mean, belief.sigma).pdf(room)
     assert 1.0 < (room - belief.mean) / belief.sigma < 3.0
     assert 100 * density == pytest.approx(rate)
+
+
+@pytest.mark.parametrize(("worth", "deviations"), [(1.0, 1.0), (1e-6, 3.0), (0.0, 3.0)])
+def test_waiting_ends_one_to_three_standard_deviations_early(
+    worth: float, deviations: float
+) -> None:
+    """One where much can be won, three where next to nothing can, or nothing."""
+    cloud = outlook(32)
+    belief = cloud.beliefs.belief(M)
+    room = cloud.patience(M, worth, 1e-3) - 10 * MS
+    assert (room - belief.mean) / belief.sigma == pytest.approx(deviations)
 
 
 def test_a_start_in_the_cloud_may_count_on_one_standard_deviation() -> None:
@@ -204,6 +265,27 @@ def test_a_plan_passes_over_what_would_have_to_be_early(
     """A job of 100, give or take 20, is not tried where it must take less than 80."""
     lane = JobQueue(TimeEstimate(100, 20), [Job("job", 0, deadline, 100, 0)])
     assert chosen(lane) == (["job"] if runs else [])
+
+
+def test_a_plan_counts_the_chance_from_where_a_job_begins() -> None:
+    """Begun at 100 and due at 190, a job of 100 ± 20 has 31 % of 100, less than its loss of 50."""
+    lane = JobQueue(TimeEstimate(100, 20), [Job("job", 0, 190, 100, 50)])
+    assert chosen(lane, start=100) == []
+    assert chosen(lane, start=50) == ["job"]
+
+
+def test_a_plan_runs_nothing_for_nothing() -> None:
+    """A loss of the benefit gains nothing, for certain."""
+    assert chosen(JobQueue(TimeEstimate(100, 1e-6), [Job("job", 0, 500, 100, 100)])) == []
+    assert chosen(JobQueue(TimeEstimate(100, 1e-6), [Job("job", 0, 500, 100, 99)])) == ["job"]
+
+
+def test_a_plan_prefers_a_quick_gain_to_a_long_small_one() -> None:
+    """Each must start at once, so one of the two is lost."""
+    quick = JobQueue(TimeEstimate(10, 1e-6), [Job("quick", 0, 11, 100, 0)])
+    long = JobQueue(TimeEstimate(200, 1e-6), [Job("long", 0, 201, 5, 0)])
+    assert chosen(quick, long) == ["quick"]
+    assert chosen(long, quick) == ["quick"]
 
 
 def test_a_plan_takes_a_lane_s_jobs_in_their_order_and_passes_over_the_hopeless() -> None:

@@ -40,6 +40,23 @@ def test_a_plan_may_wait_for_as_long_as_the_gap(gap: float, first: str) -> None:
     assert chosen(cheap, dear, gap=gap)[0] == first
 
 
+@pytest.mark.parametrize(("until", "count"), [(100, 1), (101, 2)])
+def test_a_plan_ends_with_the_job_that_ends_at_its_horizon(until: float, count: int) -> None:
+    """Of two jobs of 100, the first reaches 100 and not 101."""
+    jobs = [Job(name, 0, 1000, 100, 0) for name in ("first", "second")]
+    assert (
+        chosen(JobQueue(TimeEstimate(100, 1e-6), jobs), until=until) == ["first", "second"][:count]
+    )
+
+
+def test_a_plan_without_alternatives_keeps_the_one_that_gains_most() -> None:
+    """One plan is kept after each step: that of 100 in 10, not that of 10 in 50."""
+    good = one("good", 10, deadline=11, benefit=100)
+    long = one("long", 50, deadline=51, benefit=10)
+    assert chosen(good, long, width=1) == ["good"]
+    assert chosen(long, good, width=1) == ["good"]
+
+
 @pytest.mark.parametrize(("now", "later"), [(100, 50), (50, 100)])
 def test_of_two_orders_of_the_same_jobs_the_one_without_idle_time_is_taken(
     now: float, later: float

@@ -22,6 +22,7 @@ from aerodaas.schedulers.analytics.base import (
 )
 from aerodaas.schedulers.analytics.published.cloud_only import CloudOnly
 from aerodaas.schedulers.analytics.published.dedas import Dedas
+from aerodaas.schedulers.analytics.published.dem import Dem
 from aerodaas.schedulers.analytics.published.dems import Dems
 from aerodaas.schedulers.analytics.published.dems_a import DemsA
 from aerodaas.schedulers.analytics.published.edge_cloud import EdgeCloudEdf
@@ -60,6 +61,24 @@ def test_cloud_only_sends_until_the_last_moment_and_says_why_not_later() -> None
     assert CloudOnly().task_arrived(one, late + 1) == [Drop(one, "no time left for the cloud")]
 
 
+@pytest.mark.parametrize(("cost", "sent"), [(100, False), (99.5, True)])
+def test_any_gain_at_all_is_worth_the_cloud(cost: float, sent: bool) -> None:  # noqa: FBT001
+    """Half a unit is a gain; a cost of the benefit is none, and the reason says so."""
+    one = task(model("m", costs=(1, cost)))
+    (decision,) = CloudOnly().task_arrived(one, 0)
+    dropped = Drop(one, "the cloud costs more than the result is worth")
+    assert decision == (SendToCloud(one, "cloud only", 700 * MILLISECOND) if sent else dropped)
+    ends = play(EdgeCloudEdf(), [(0, model("long", edge=950)), (0, one.profile)])
+    assert ends[1].place == ("cloud" if sent else "nowhere")
+
+
+def test_without_a_cloud_cloud_only_drops() -> None:
+    """There is no slot that it could wait for."""
+    scheduler = CloudOnly()
+    scheduler.start(Resources(cloud_slots=0), 0)
+    assert [type(one) for one in scheduler.task_arrived(task(model("m")), 0)] == [Drop]
+
+
 @pytest.mark.parametrize(("deadline", "place"), [(150, "cloud"), (151, "edge")])
 def test_edge_and_cloud_want_to_be_done_before_the_deadline(deadline: float, place: str) -> None:
     """Behind the block a task of 100 is done at 150."""
@@ -68,12 +87,43 @@ def test_edge_and_cloud_want_to_be_done_before_the_deadline(deadline: float, pla
     assert play(Kalmia(), [(0, BLOCK), (0, one)])[1].place == place
 
 
+def test_edge_and_cloud_as_published_order_by_the_relative_deadline() -> None:
+    """One that came later with a shorter relative deadline overtakes."""
+    tasks = [(0.0, BLOCK), (1.0, model("early", deadline=500)), (40.0, model("late", deadline=480))]
+    for published, first in ((False, 1), (True, 2)):
+        ends = play(EdgeCloudEdf(published=published), tasks)
+        assert ends[first].started == 50
+        assert ends[3 - first].started == 150
+
+
+@pytest.mark.parametrize(("deadline", "place"), [(300, "nowhere"), (301, "cloud")])
+def test_kalmia_wants_the_cloud_to_be_done_before_the_deadline(deadline: float, place: str) -> None:
+    """A task that takes 300 there and finds the edge busy."""
+    ends = play(Kalmia(), [(0, model("long", edge=950)), (0, model("m", deadline=deadline))])
+    assert ends[1].place == place
+
+
 def test_dedas_drops_what_neither_place_can_finish() -> None:
     """The edge is busy until 900, and the cloud takes 300 of 250; of 300 it just does."""
     long = model("long", edge=900)
     ends = play(Dedas(), [(0, long), (0, model("m", deadline=250)), (0, model("n", deadline=300))])
     assert ends[1] == End("nowhere", "dropped", 0, 0)
     assert ends[2] == End("cloud", "done", 0, 300)
+
+
+def test_dedas_at_equality_is_late_with_a_newcomer_and_in_time_with_a_victim() -> None:
+    """Behind the block, 100 is done at 150: too late for a newcomer due then. 300 more is 450."""
+    long = model("long", deadline=450, edge=300)
+    assert play(Dedas(), [(0, BLOCK), (1, model("n", deadline=149, cloud=60))])[1].place == "cloud"
+    ends = play(Dedas(), [(0, BLOCK), (0, long), (1, model("n", deadline=150))])
+    assert [end.place for end in ends] == ["edge", "edge", "edge"]
+
+
+@pytest.mark.parametrize(("deadline", "place"), [(300, "cloud"), (299, "nowhere")])
+def test_the_cloud_may_end_at_the_deadline(deadline: float, place: str) -> None:
+    """A task of 300 there, that came at 0 and finds the edge busy."""
+    ends = play(EdgeCloudEdf(), [(0, model("long", edge=950)), (0, model("m", deadline=deadline))])
+    assert ends[1].place == place
 
 
 def test_dedas_says_of_its_victim_that_it_was_migrated() -> None:
@@ -86,6 +136,42 @@ def test_dedas_says_of_its_victim_that_it_was_migrated() -> None:
     newcomer = task(model("short", deadline=390), number=2)
     (sent,) = dedas.task_arrived(newcomer, 0)
     assert sent == SendToCloud(victim, MIGRATED, 100 * MILLISECOND)
+
+
+@pytest.mark.parametrize(("deadline", "migrated"), [(450, False), (449, True)])
+def test_dem_leaves_alone_what_still_ends_at_its_deadline(
+    deadline: float,
+    migrated: bool,  # noqa: FBT001
+) -> None:
+    """Block 50, newcomer 100, then 300: done at 450."""
+    waiting = model("waiting", deadline=deadline, edge=300, cloud=350)
+    newcomer = model("newcomer", deadline=200, cloud=500)
+    ends = play(Dem(), [(0, BLOCK), (0, waiting), (1, newcomer)])
+    assert (ends[1].place == "cloud") == migrated
+    assert ends[2] == End("edge", "done", 50, 150)
+
+
+@pytest.mark.parametrize(("cloud", "stays"), [(399, True), (398, False)])
+def test_dem_counts_on_the_cloud_only_before_the_deadline(
+    cloud: float,
+    stays: bool,  # noqa: FBT001
+) -> None:
+    """At 1, a victim due at 400 that takes 399 there would lose all of 99, and stays."""
+    victim = model("victim", deadline=400, edge=300, cloud=cloud)
+    newcomer = model("newcomer", deadline=250, cloud=200, costs=(1, 80))
+    ends = play(Dem(), [(0, BLOCK), (0, victim), (1, newcomer)])
+    assert (ends[1].place == "edge") == stays
+    assert (ends[2].place == "cloud") == stays
+
+
+def test_dems_steals_what_gains_nothing_in_the_cloud_before_what_gains_a_little() -> None:
+    """Whatever they gain per millisecond on the edge: the other has somewhere to go."""
+    nothing = model("nothing", deadline=900, edge=300, costs=(60, 100))
+    little = model("little", deadline=900, edge=50, costs=(1, 99))
+    tasks = [(0.0, model("long", edge=900)), (0.0, little), (0.0, nothing)]
+    ends = play(Dems(), tasks, edge_ms=[300, 50, 300])
+    assert ends[2] == End("edge", "done", 300, 600)
+    assert ends[1] == End("cloud", "done", 590, 890)
 
 
 def test_dems_says_what_it_stole() -> None:
@@ -160,6 +246,14 @@ def test_dems_a_ignores_a_difference_of_10_ms(taken: float, waits: float) -> Non
     assert one.waits == pytest.approx(waits, abs=1e-6)
 
 
+def test_dems_a_keeps_whole_nanoseconds() -> None:
+    """A mean between two of them is rounded down."""
+    one = Adapting()
+    for number in range(10):
+        one.result(350 + (number == 0) * 5e-6)
+    assert one.waits == 240
+
+
 def test_dems_a_learns_from_answers_of_the_cloud_alone() -> None:
     """A task that never came back has no time, and the edge's times are the edge's."""
     one = Adapting()
@@ -194,3 +288,15 @@ def test_dems_a_probes_after_ten_seconds_and_again_after_a_late_probe() -> None:
     assert [type(each) for each in decided] == [Drop]
     _, decided = one.arrives(21_000, 340)
     assert decided == [WakeAt(21_030 * MILLISECOND)]
+
+
+def test_what_gains_nothing_in_the_cloud_is_no_probe_and_starts_no_cooling() -> None:
+    """It waits to be stolen, as ever."""
+    one = Adapting()
+    for _ in range(10):
+        one.result(350)
+    free = Profile("cloudy", 20, 340 * MILLISECOND, 100 * MILLISECOND, 300 * MILLISECOND, 1, 20)
+    waiting = Task(99, free, 0, free.deadline)
+    assert list(one.scheduler.task_arrived(waiting, 0)) == [WakeAt(230 * MILLISECOND)]
+    _, decided = one.arrives(10_000, 340)
+    assert [type(each) for each in decided] == [Drop], "cooling begins only now"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -177,6 +178,13 @@ def test_many_waypoints_with_deadlines_are_served() -> None:
     assert len(OptimalScheduler(budget=0.3).plan(hurried(150, 0), HOME)) >= 21
     drones = {"left": HOME, "right": HOME}
     assert sum(map(len, share_out(hurried(150, 0), drones, budget=0.5).values())) >= 21
+
+
+@needs_solver
+def test_a_deadline_of_decades_is_planned_with() -> None:
+    """The largest that a waypoint may have, beside a shorter one, is no error in flight."""
+    pending = [replace(waypoint, deadline=1e9) for waypoint in scatter(14)]
+    assert len(OptimalScheduler(budget=0.05).plan(pending, HOME)) == 14
 
 
 @needs_solver
