@@ -27,6 +27,8 @@ from aerodaas.recording.report.flight import RecordedFlight
 
 pytestmark = pytest.mark.wall_clock
 
+MAGIC = 8
+"""Bytes by which an MCAP file is known."""
 HERE = Path(__file__).resolve().parents[1]
 ROOT = HERE.parent
 
@@ -47,6 +49,26 @@ print("written", flush=True)
 time.sleep(600)
 """
 
+FILLER = """
+import resource
+resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, 500_000))
+told, further = [], 0
+for message in SyntheticFlight(frames=4).messages():
+    try:
+        recorder.write(message)
+    except RecordingError as error:
+        told.append(str(error))
+    further += bool(told)
+    if further == 200:
+        break
+summary = recorder.close()
+assert len(told) == 1, told
+assert told[0] == summary.stopped
+assert sum(summary.drops.values()) >= 200
+assert summary.size <= 500_000
+print(told[0])
+"""
+
 
 def start(program: str, path: Path) -> subprocess.Popen[str]:
     """Run a recorder in a process of its own."""
@@ -65,6 +87,12 @@ def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("crash") / "flight.mcap"
     record(path, SyntheticFlight(rate=2, hover=1.0, frames=0.2))
     return path
+
+
+def count(path: Path) -> int:
+    """Messages that can be read."""
+    with Recording.open(path) as recording:
+        return sum(1 for _ in recording.records())
 
 
 def test_killed_process_leaves_everything_flushed(tmp_path: Path) -> None:
@@ -93,6 +121,35 @@ def states(path: Path) -> int:
         return sum(1 for _ in recording.records(schemas={"aerodaas.VehicleState"}))
 
 
+def test_full_disk_stops_recording_once_and_clearly(tmp_path: Path) -> None:
+    """The flight goes on, one error says why, and the file ends at a whole record."""
+    path = tmp_path / "full.mcap"
+    with start(FILLER, path) as process:
+        output, _ = process.communicate(timeout=120)
+    assert process.returncode == 0
+    assert "full.mcap could not be written any further" in output
+    with Recording.open(path) as recording:
+        assert sum(1 for _ in recording.records()) > 100
+        assert recording.damaged == 0
+
+
+@given(share=st.floats(0, 1))
+@settings(max_examples=40)
+def test_cut_off_anywhere_reads_a_part(flight: Path, share: float) -> None:
+    """A file cut off at any byte is refused clearly or gives what lies before the cut."""
+    data = flight.read_bytes()
+    cut = flight.with_name("cut.mcap")
+    cut.write_bytes(data[: int(share * len(data))])
+    whole = count(flight)
+    if int(share * len(data)) < MAGIC:
+        with pytest.raises(RecordingError, match=r"cut\.mcap"):
+            count(cut)
+    else:
+        found = count(cut)
+        assert found <= whole
+        assert found == whole or share < 1.0
+
+
 @given(st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), max_size=8))
 @settings(max_examples=40)
 def test_damaged_anywhere_reads_the_rest(flight: Path, changes: list[tuple[float, int]]) -> None:
@@ -106,6 +163,32 @@ def test_damaged_anywhere_reads_the_rest(flight: Path, changes: list[tuple[float
     with suppress(RecordingError), Recording.open(damaged) as recording:
         RecordedFlight.read(recording)
         list(frames(recording))
+
+
+def test_damaged_chunk_is_skipped_and_counted(flight: Path, tmp_path: Path) -> None:
+    """One bad chunk costs its own messages only."""
+    with Recording.open(flight) as recording:
+        block = recording._index.blocks[1]
+    data = bytearray(flight.read_bytes())
+    data[block.offset + block.length // 2] ^= 0xFF
+    path = tmp_path / "chunk.mcap"
+    path.write_bytes(data)
+    with Recording.open(path) as recording:
+        found = sum(1 for _ in recording.records())
+        assert recording.damaged == 1
+    assert 0 < found < count(flight)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(b"", "is empty"), (b"%PDF-1.7 something", "is not an MCAP recording"), (b"\x89MC", "is not")],
+)
+def test_no_recording(tmp_path: Path, content: bytes, words: str) -> None:
+    """Empty and foreign files are told apart."""
+    path = tmp_path / "it.mcap"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=words):
+        Recording.open(path)
 
 
 def test_missing_file(tmp_path: Path) -> None:

@@ -140,6 +140,12 @@ def test_a_live_view_of_impossible_settings_is_refused_by_a_sentence(
     assert "streams: " in text
 
 
+def test_nobody_is_sent_elsewhere(provider: Served) -> None:
+    """A path with a slash too many was answered by a redirection to whatever `Host` said."""
+    status, text = provider.ask("GET", "/v1/missions/")
+    assert (status, text) == (404, "Not Found")
+
+
 def test_another_tenants_lease_flies_nobody_elses_mission(
     provider: Served, victim: dict[str, Any], stranger: str
 ) -> None:

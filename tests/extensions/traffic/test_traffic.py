@@ -146,6 +146,26 @@ def test_the_action_is_what_is_demanded(action: Any, demand: FailsafeAction) -> 
     assert fault.text == "traffic: HBXYZ is 60 m away, 30 m above"
 
 
+def test_texts_tell_below_unknown_and_coming() -> None:
+    """As it is."""
+    texts = [
+        one.text
+        for one in near(
+            state(
+                aircraft((0.0, 30.0, -20.0)),
+                aircraft((0.0, 30.0, math.nan), address=2),
+                aircraft((250.0, 0.0, 10.0), (-30.0, 0.0, 0.0), address=3),
+            ),
+            CLOSE,
+        )
+    ]
+    assert texts == [
+        "traffic: HBXYZ is 30 m away, 30 m below",
+        "traffic: HBXYZ is 30 m away, at an unknown height",
+        "traffic: HBXYZ is 250 m away, 0 m above, coming nearer",
+    ]
+
+
 def test_nothing_is_judged_that_is_to_be_ignored_or_from_nowhere() -> None:
     """Without a position of its own, nobody is near; other faults say what to do then."""
     beside = aircraft((10.0, 0.0, 10.0))
@@ -236,6 +256,18 @@ def test_an_unknown_height_keeps_nobody_apart() -> None:
     assert clamped((0.0, 0.0, 4.0), beside(0.0, 0.0, math.nan))[0] == [0.0, 0.0, 4.0]
 
 
+def test_what_comes_nearer_meanwhile_is_room_that_is_not_there() -> None:
+    """10 m/s for the 3.3 s that a stop takes; what flies off gives no room."""
+    braking = WIDE.reaction_time + WIDE.max_speed / WIDE.max_acceleration
+    for speed, room in ((10.0, 40.0 - 10.0 * braking), (-10.0, 40.0)):
+        other = beside(140.0, 0.0, 0.0, velocity=(-speed, 0.0, 0.0))
+        (east, _, _), _ = clamped((9.0, 0.0, 0.0), other)
+        expected = room * 1.0
+        assert min(east * WIDE.reaction_time + east**2 / 6.0, 15.0) == pytest.approx(
+            min(expected, 9.0 * WIDE.reaction_time + 81 / 6.0, 15.0)
+        )
+
+
 @given(vectors, velocities, velocities)
 def test_standing_still_is_always_allowed(way: Vector, flies: Vector, asked: Vector) -> None:
     """Whatever flies around: what is sent is finite, and no nearing within the distance."""
@@ -299,6 +331,46 @@ def test_a_drone_waits_until_the_aircraft_is_gone() -> None:
     assert nearest(flying) > 29.5
 
 
+def test_two_aircraft_are_told_of_each() -> None:
+    """Though their callsigns differ in figures alone."""
+    swiss = aircraft((25.0, 0.0, 2.0), address=1, callsign="SWR123")
+    other = aircraft((25.0, 9.0, 2.0), address=2, callsign="SWR456")
+    flying = flown(lambda now: [swiss, other] if now > 5.0 else [swiss] if now > 4.0 else [])
+    flying.run(20.0)
+    told = [alert.text for alert in flying.mission.alerts if alert.kind == "traffic"]
+    assert [text.split()[1] for text in told] == ["SWR123", "SWR456"]
+
+
+@pytest.mark.parametrize(("action", "place"), [("return", 0.0), ("land", 12.0)])
+def test_it_comes_home_or_lands_where_told_to(action: str, place: float) -> None:
+    """And does not go on when the aircraft is gone."""
+    flying = flown(crossing(), action)
+    flying.run()
+    flying.expect(S.LANDED)
+    assert not flying.status.visited
+    assert "HBXYZ" in flying.status.reason
+    assert float(flying.vehicle.position[0]) == pytest.approx(place, abs=1.5)
+
+
+def test_a_warning_changes_nothing_but_is_told() -> None:
+    """The drone flies under the aircraft."""
+    flying = flown(crossing(until=90.0), "warn")
+    flying.run()
+    flying.expect(S.LANDED)
+    assert list(flying.status.visited) == ["far"]
+    assert [alert.kind for alert in flying.mission.alerts] == ["traffic"]
+    assert nearest(flying) < 29.0
+    assert not any("traffic" in record.clipped_by for record in flying.records)
+
+
+def test_nobody_is_told_of_what_is_ignored() -> None:
+    """At all."""
+    flying = flown(crossing(until=90.0), "ignore")
+    flying.run()
+    flying.expect(S.LANDED)
+    assert not flying.mission.alerts
+
+
 def test_a_low_battery_comes_first() -> None:
     """While it holds for an aircraft its battery runs low: it goes home, and tells of both."""
     flying = flown(crossing(until=600.0))
@@ -310,6 +382,16 @@ def test_a_low_battery_comes_first() -> None:
     assert "battery" in flying.status.reason
     assert float(np.linalg.norm(flying.vehicle.position[:2])) < 0.6
     assert {"traffic", "battery_low"} <= {alert.kind for alert in flying.mission.alerts}
+
+
+def test_a_critical_battery_lands_it_beside_the_aircraft() -> None:
+    """Nothing keeps it up."""
+    flying = flown(crossing(until=600.0))
+    flying.run(15.0)
+    flying.vehicle.charge = 0.1
+    flying.run()
+    flying.expect(S.LANDED)
+    assert "critical" in flying.status.reason
 
 
 def test_a_return_waits_for_an_aircraft_over_home() -> None:
@@ -328,6 +410,16 @@ def test_a_return_waits_for_an_aircraft_over_home() -> None:
     flying.run()
     flying.expect(S.LANDED)
     assert float(np.linalg.norm(flying.vehicle.position[:2])) < 0.6
+
+
+def test_a_lost_link_goes_before_traffic() -> None:
+    """The vehicle comes home by itself."""
+    flying = flown(crossing(until=600.0))
+    flying.run(15.0)
+    flying.vehicle.lost = True
+    flying.run(6.0)
+    flying.expect(S.RETURNING)
+    assert "no word" in flying.status.reason
 
 
 @pytest.mark.parametrize(
