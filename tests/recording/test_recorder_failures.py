@@ -93,6 +93,38 @@ def test_a_disk_that_fills_up_is_told_once_and_costs_what_follows(
     assert lines(path) == ["kept"]
 
 
+def test_a_disk_found_full_in_a_flush_is_told_by_the_next_message(
+    tmp_path: Path, disk: Disk
+) -> None:
+    """Flushing says nothing, now or again; of two messages that follow, the first tells."""
+    made = recorder(tmp_path / "a.mcap")
+    made.write(text("gathered"))
+    disk.full = True
+    made.flush()
+    disk.full = False
+    made.flush()
+    with pytest.raises(RecordingError, match="No space left"):
+        made.write(text("refused"))
+    made.write(text("counted"))
+    assert made.close().drops == {"nav/note": 2}
+    assert lines(tmp_path / "a.mcap") == []
+
+
+def test_a_disk_found_full_by_a_drop_is_told_by_the_next_message(
+    tmp_path: Path, disk: Disk
+) -> None:
+    """A drop is counted whatever the disk says, and never raises."""
+    made = recorder(tmp_path / "a.mcap")
+    disk.full = True
+    made.drops(LONG, 2)
+    made.drops(LONG)
+    with pytest.raises(RecordingError, match="No space left"):
+        made.write(text("refused"))
+    summary = made.close()
+    assert summary.drops == {LONG: 3, "nav/note": 1}
+    assert "No space left" in summary.stopped
+
+
 def test_a_disk_found_full_at_the_end_is_in_the_summary(tmp_path: Path, disk: Disk) -> None:
     """Closing never raises, and gives the file back; what was flushed before can be read."""
     path = tmp_path / "a.mcap"
@@ -139,6 +171,22 @@ def test_everything_is_on_the_disk_when_closing_returns(
     summary = made.close()
     assert synced == [summary.size]
     assert summary.stopped == ""
+
+
+@pytest.mark.usefixtures("disk")
+def test_a_file_that_cannot_be_closed_is_closed_for_all_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An error of closing, as network drives give it, is no reason to fail a flight."""
+    made = recorder(tmp_path / "a.mcap")
+    made.write(text("there"))
+
+    def broken(_output: Output) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(Output, "close", broken)
+    summary = made.close()
+    assert (summary.messages, summary.stopped) == (1, "")
 
 
 def test_messages_reach_the_file_by_themselves(

@@ -174,6 +174,20 @@ def test_reconnecting_in_flight_takes_off_no_second_time(
             assert not ends.autopilot.armed
 
 
+@pytest.mark.parametrize("family", FAMILIES)
+def test_an_uploaded_fence_is_enforced(monkeypatch: pytest.MonkeyPatch, family: Family) -> None:
+    """Uploaded with its action: crossing it, the vehicle protects itself, and we are told."""
+    limits = {"geofence": {"polygon": [[-4, -4], [4, -4], [4, 4], [-4, 4]], "ceiling": 20}}
+    options = AutopilotOptions(family=family)
+    with Stepped(monkeypatch, options, fence="return", limits=limits) as ends:
+        ends.guide()
+        with pytest.raises(VehicleError, match="flies it"):
+            ends.stream(VelocitySetpoint(np.array([2.0, 0.0, 0.0])), 8.0)
+        assert 3.0 < float(ends.autopilot.truth.position[0]) < 9.0
+        ends.until(VehicleMode.FAILSAFE, timeout=3.0)
+        assert ends.autopilot.mode in {VehicleMode.RETURNING, VehicleMode.LANDING}
+
+
 def test_a_target_left_alone_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
     """Killed on the way to a far place, the vehicle stops within metres, not at the place."""
     with Stepped(monkeypatch, AutopilotOptions(family="ardupilot")) as ends:
