@@ -27,9 +27,11 @@ from aerodaas.mission.commands import (
     Resume,
     ReturnHome,
 )
+from aerodaas.protocol.proposals import ClearanceOut, ProposalOut
 
 __all__ = [
     "COMMANDS",
+    "USUAL_SCOPES",
     "AccountIn",
     "AccountOut",
     "AnalyticsOut",
@@ -118,6 +120,13 @@ class Scope(str, enum.Enum):
     """Receive cameras' pictures and other sensors' items."""
     COMPUTE = "compute"
     """Run analyses on the provider's edge and cloud."""
+    PROPOSE = "propose"
+    """Propose missions, which another account approves before they fly: for agents. It excludes
+    `fly`."""
+
+
+USUAL_SCOPES = (Scope.FLY, Scope.SENSE, Scope.COMPUTE)
+"""Scopes of an account that is no agent's."""
 
 
 def _in_order(scopes: list[Scope]) -> list[Scope]:
@@ -146,6 +155,8 @@ class LeaseState(str, enum.Enum):
 class MissionPhase(str, enum.Enum):
     """State of a submitted mission at the service; its drones have states of their own."""
 
+    PROPOSED = "proposed"
+    """Kept and checked; it flies once it was rehearsed and approved."""
     SUBMITTED = "submitted"
     REHEARSING = "rehearsing"
     """Being flown in simulation first."""
@@ -155,6 +166,8 @@ class MissionPhase(str, enum.Enum):
     FLYING = "flying"
     LANDED = "landed"
     """Over, as planned."""
+    APPLIED = "applied"
+    """Over: a change of another mission in flight, which flies it."""
     REFUSED = "refused"
     CANCELLED = "cancelled"
     FAILED = "failed"
@@ -162,7 +175,7 @@ class MissionPhase(str, enum.Enum):
     @property
     def over(self) -> bool:
         """Whether nothing follows this phase."""
-        return self in {self.LANDED, self.REFUSED, self.CANCELLED, self.FAILED}
+        return self in {self.LANDED, self.APPLIED, self.REFUSED, self.CANCELLED, self.FAILED}
 
 
 class StreamKind(str, enum.Enum):
@@ -347,6 +360,10 @@ class VerdictOut(AnswerModel):
     battery_used: float | None = None
     picture: str | None = None
     """Path of a PNG of the flight, at this service."""
+    seeds: list[int] = Field(default_factory=list)
+    """Seeds of the flights in simulation; each had to be good."""
+    clearance: ClearanceOut | None = None
+    """Smallest distance from an object, of all these flights; None in an empty world."""
 
 
 class AnalyticsOut(AnswerModel):
@@ -421,6 +438,8 @@ class MissionOut(AnswerModel):
     """What the analytics scheduler has done so far; None without one, and after the flight."""
     recording: bool = False
     """Whether the recording can be fetched."""
+    proposal: ProposalOut | None = None
+    """What an approver is shown; None for a mission that was submitted to be flown."""
 
 
 CommandWord: TypeAlias = Literal["pause", "resume", "clear", "return-home", "land"]
@@ -492,7 +511,7 @@ class AccountIn(RequestModel):
     name: Word
     tenant: Word
     role: Role = Role.PILOT
-    scopes: Scopes = Field(default_factory=lambda: list(Scope))
+    scopes: Scopes = Field(default_factory=lambda: list(USUAL_SCOPES))
 
 
 class AccountOut(AnswerModel):
