@@ -37,10 +37,10 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> str | Path:
 @pytest.fixture
 def store(place: str | Path) -> Iterator[Store]:
     """With the tenant `farm` and its account `pilot`."""
-    from aerodaas.protocol.schemas import Role, Scope  # noqa: PLC0415
+    from aerodaas.protocol.schemas import USUAL_SCOPES, Role  # noqa: PLC0415
     from aerodaas.service.store import Account, Store, Tenant  # noqa: PLC0415
 
     with Store.open(place) as opened:
         opened.tenants.add(Tenant("farm"))
-        opened.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(Scope), 0.0))
+        opened.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(USUAL_SCOPES), 0.0))
         yield opened

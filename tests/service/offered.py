@@ -17,13 +17,13 @@ from aerodaas.messages.mission import MissionState
 from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.schemas import (
+    USUAL_SCOPES,
     FlightLeaseIn,
     LinkState,
     MissionIn,
     MissionOut,
     MissionPhase,
     Role,
-    Scope,
     StreamKind,
 )
 from aerodaas.service import mission as missions
@@ -40,7 +40,7 @@ from aerodaas.service.monitor.reports import WatchedVehicle
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Account, Store, Tenant
 
-PILOT = Principal("pilot", "farm", Role.PILOT, frozenset(Scope), "t")
+PILOT = Principal("pilot", "farm", Role.PILOT, frozenset(USUAL_SCOPES), "t")
 
 
 class Monitor:
@@ -139,7 +139,7 @@ class Provider:
         self.settings.state.mkdir()
         self.store = Store.open(folder / "service.db")
         self.store.tenants.add(Tenant("farm"))
-        self.store.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(Scope), 0.0))
+        self.store.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(USUAL_SCOPES), 0.0))
         self._watched = watched
         self.open()
 

@@ -10,6 +10,7 @@ import pytest
 from offered import PILOT, Link, Provider
 
 from aerodaas.protocol.schemas import (
+    USUAL_SCOPES,
     FlightLeaseIn,
     MissionIn,
     MissionOut,
@@ -71,7 +72,7 @@ def test_who_is_granted_senses_beside_the_flight(provider: Provider) -> None:
     assert (shown.attach, shown.robots, shown.lease) == (host.id, [], None)
     (one, _) = provider.fleet.seen_by(CITY).robots
     assert (one.mission, one.shared) == (host.id, ["one/cam"])
-    for who in (PILOT, Principal("eve", "evil", Role.PILOT, frozenset(Scope), "t")):
+    for who in (PILOT, Principal("eve", "evil", Role.PILOT, frozenset(USUAL_SCOPES), "t")):
         with pytest.raises(RefusedError, match="there is no mission"):
             provider.missions.mission(who, mission.id)
 

@@ -12,7 +12,14 @@ from offered import PILOT, Link, Monitor, Provider
 
 from aerodaas.errors import MissionError
 from aerodaas.mission.commands import Answer
-from aerodaas.protocol.schemas import FlightLeaseIn, LeaseIn, LinkState, MissionPhase, Role, Scope
+from aerodaas.protocol.schemas import (
+    USUAL_SCOPES,
+    FlightLeaseIn,
+    LeaseIn,
+    LinkState,
+    MissionPhase,
+    Role,
+)
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.mission import ActiveMission
@@ -21,7 +28,7 @@ from aerodaas.service.models.model_store import ModelStore
 from aerodaas.service.monitor.process import FleetMonitor
 from aerodaas.service.monitor.reports import WatchedVehicle
 
-OPERATOR = Principal("olga", "provider", Role.OPERATOR, frozenset(Scope), "t")
+OPERATOR = Principal("olga", "provider", Role.OPERATOR, frozenset(USUAL_SCOPES), "t")
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.http_server.addresses import listen
 from aerodaas.mission.commands import Answer, Steer
 from aerodaas.protocol.piloting import ControlsIn
-from aerodaas.protocol.schemas import AccountIn, MissionPhase, Role, Scope, TokenIn
+from aerodaas.protocol.schemas import USUAL_SCOPES, AccountIn, MissionPhase, Role, Scope, TokenIn
 from aerodaas.service import mission as missions
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.principal import Principal
@@ -86,7 +86,7 @@ class Service:
         """A token of an account, which is made if it is new."""
         with contextlib.suppress(Exception):
             self.accounts.add(AccountIn(name=name, tenant=of, role=role))
-        made = self.accounts.issue(TokenIn(account=name, scopes=list(scopes or Scope)))
+        made = self.accounts.issue(TokenIn(account=name, scopes=list(scopes or USUAL_SCOPES)))
         return str(made.secret)
 
     def revoke(self, name: str) -> None:
@@ -115,7 +115,7 @@ class Service:
         from aerodaas.protocol.schemas import MissionIn  # noqa: PLC0415 - a request
 
         self.token("asha")
-        pilot = Principal("asha", "farm", Role.PILOT, frozenset(Scope), "t")
+        pilot = Principal("asha", "farm", Role.PILOT, frozenset(USUAL_SCOPES), "t")
         sensors = ["one/odometry", "one/cam"]
         flight = document("one", (5, 0), sensors=sensors, analyses=[SEEN], **changes)
         (missions,) = self.services
@@ -190,11 +190,11 @@ def test_the_users_side_ends_with_its_token(service: Service, change: str) -> No
     flight.close()
 
 
-@pytest.mark.parametrize("lacks", list(Scope))
+@pytest.mark.parametrize("lacks", USUAL_SCOPES)
 def test_the_users_side_needs_what_submitting_needs(service: Service, lacks: Scope) -> None:
     """Its pictures, its navigation and its analyses would be had without the scope."""
     mission = service.submit()
-    token = service.token("ivan", *(one for one in Scope if one is not lacks))
+    token = service.token("ivan", *(one for one in USUAL_SCOPES if one is not lacks))
     with pytest.raises(InvalidStatus) as refused, service.socket(f"{mission}/here", token):
         pass
     assert refused.value.response.status_code == 403

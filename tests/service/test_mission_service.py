@@ -18,11 +18,11 @@ from aerodaas.config.model import SimulationConfig
 from aerodaas.errors import MissionError
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
+    USUAL_SCOPES,
     LeaseIn,
     MissionIn,
     MissionPhase,
     Role,
-    Scope,
     VerdictOut,
 )
 from aerodaas.service import mission as missions
@@ -90,7 +90,7 @@ def test_rehearsals_take_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     """As many at once as the provider has cores; nobody waits for all that others have sent."""
     made = unwatched(tmp_path, monkeypatch, rehearse=True, most_rehearsals=1, most_flights=0)
     made.store.tenants.add(Tenant("city"))
-    made.store.accounts.add(Account("warden", "city", Role.PILOT, frozenset(Scope), 0.0))
+    made.store.accounts.add(Account("warden", "city", Role.PILOT, frozenset(USUAL_SCOPES), 0.0))
     farm = [made.submit("one") for _ in range(3)]
     made.turns(1)
     city = made.missions.submit(

@@ -18,7 +18,14 @@ from served import document, fleet, robot
 from test_mission_service import unwatched
 
 from aerodaas.errors import MissionError
-from aerodaas.protocol.schemas import LeaseIn, LeaseState, MissionOut, MissionPhase, Role, Scope
+from aerodaas.protocol.schemas import (
+    USUAL_SCOPES,
+    LeaseIn,
+    LeaseState,
+    MissionOut,
+    MissionPhase,
+    Role,
+)
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.folder import FlightFolder, RobotLocks
@@ -26,7 +33,7 @@ from aerodaas.service.store import Account, Mission, Tenant
 
 pytestmark = pytest.mark.wall_clock
 
-CROWD = Principal("crowd", "crowd", Role.PILOT, frozenset(Scope), "t")
+CROWD = Principal("crowd", "crowd", Role.PILOT, frozenset(USUAL_SCOPES), "t")
 ROWS = 3000
 HOLD = """
 import sys
@@ -57,7 +64,7 @@ def held(locks: Path) -> Iterator[subprocess.Popen[str]]:
 def crowded(served: Provider, phase: MissionPhase, **changes: object) -> None:
     """Add thousands of newer missions of another tenant for drone `two`."""
     served.store.tenants.put(Tenant("crowd"))
-    served.store.accounts.put(Account("crowd", "crowd", Role.PILOT, frozenset(Scope), 0.0))
+    served.store.accounts.put(Account("crowd", "crowd", Role.PILOT, frozenset(USUAL_SCOPES), 0.0))
     request = {"minutes": 1.0, "silence": "continue", "silence_seconds": 30.0, "seed": None}
     row = Mission("", "visits", "crowd", "crowd", phase, ("two",), 4e9, "", request=request)
     row = replace(row, **changes)  # type: ignore[arg-type]

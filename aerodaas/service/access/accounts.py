@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from http import HTTPStatus
 
-from aerodaas.protocol.schemas import AccountIn, Role, Scope, TokenIn, TokenOut
+from aerodaas.protocol.schemas import USUAL_SCOPES, AccountIn, Role, Scope, TokenIn, TokenOut
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.oidc import Issued, OidcVerifier
 from aerodaas.service.access.principal import Principal
@@ -134,7 +134,7 @@ class Accounts:
                     name=_name_of(issued),
                     tenant=issued.tenant,
                     role=issued.role,
-                    scopes=frozenset(Scope),
+                    scopes=frozenset(USUAL_SCOPES),
                     created=self._clock(),
                     subject=issued.subject,
                 )

@@ -7,7 +7,7 @@ import secrets
 import threading
 from collections.abc import Callable, Mapping
 
-from aerodaas.protocol.schemas import AccountOut, Role, Scope
+from aerodaas.protocol.schemas import USUAL_SCOPES, AccountOut, Role, Scope
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.http.limits import WrongTokens
@@ -29,7 +29,7 @@ def principal_of(account: str, role: Role) -> Principal:
         account: Name of the account.
         role: Its role.
     """
-    scopes = frozenset({Scope.SENSE}) if role is Role.VIEWER else frozenset(Scope)
+    scopes = frozenset({Scope.SENSE}) if role is Role.VIEWER else frozenset(USUAL_SCOPES)
     return Principal(account=account, tenant=OWN, role=role, scopes=scopes, token=account)
 
 

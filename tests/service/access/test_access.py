@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from aerodaas.protocol.schemas import AccountIn, Role, Scope, TokenIn
+from aerodaas.protocol.schemas import USUAL_SCOPES, AccountIn, Role, Scope, TokenIn
 from aerodaas.service.access import accounts as access
 from aerodaas.service.access.accounts import Access, Accounts
 from aerodaas.service.access.audit import Audit
@@ -221,7 +221,7 @@ def test_a_revoked_token_is_not_remembered(service: Service) -> None:
 def test_each_role_may_do_what_those_before_it_may(have: Role, wanted: Role) -> None:
     """In the order viewer, pilot, operator, admin."""
     order = [Role.VIEWER, Role.PILOT, Role.OPERATOR, Role.ADMIN]
-    principal = Principal("a", "farm", have, frozenset(Scope), "")
+    principal = Principal("a", "farm", have, frozenset(USUAL_SCOPES), "")
     if order.index(have) >= order.index(wanted):
         require(principal, wanted)
         return
@@ -241,7 +241,7 @@ def test_a_scope_that_the_token_lacks_is_refused() -> None:
 
 def test_a_tenant_sees_its_own_and_what_is_shared_with_it() -> None:
     """An operator sees all."""
-    pilot = Principal("a", "farm", Role.PILOT, frozenset(Scope), "")
+    pilot = Principal("a", "farm", Role.PILOT, frozenset(USUAL_SCOPES), "")
     assert sees(pilot, "farm")
     assert not sees(pilot, "campus")
     assert sees(pilot, "campus", ["elsewhere", "farm"])

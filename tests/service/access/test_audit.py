@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from aerodaas.protocol.schemas import Role, Scope
+from aerodaas.protocol.schemas import USUAL_SCOPES, Role
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import StoreError
 from aerodaas.service.store import AuditEntry, Store
 
-PILOT = Principal("pilot", "farm", Role.PILOT, frozenset(Scope), "0" * 16)
+PILOT = Principal("pilot", "farm", Role.PILOT, frozenset(USUAL_SCOPES), "0" * 16)
 
 
 def test_an_entry_has_who_what_and_whether(store: Store) -> None:

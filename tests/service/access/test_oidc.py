@@ -18,7 +18,7 @@ from cryptography.hazmat.primitives.asymmetric import rsa
 from oidc_issuer import AUDIENCE, Issuer
 
 from aerodaas.errors import ConfigError, SourceError
-from aerodaas.protocol.schemas import AccountIn, Role, Scope
+from aerodaas.protocol.schemas import USUAL_SCOPES, AccountIn, Role, Scope
 from aerodaas.service.access import issuer_keys
 from aerodaas.service.access.accounts import Access, Accounts
 from aerodaas.service.access.audit import Audit
@@ -60,7 +60,7 @@ def status_of(access: Access, token: str) -> int:
 def test_a_token_is_its_subjects_account(issuer: Issuer, store: Store) -> None:
     """Made at the first request, with the token's tenant and role; the next finds the same."""
     found = access(store, issuer).of(issuer.token(), "10.0.0.1")
-    assert (found.tenant, found.role, found.scopes) == ("farm", Role.PILOT, frozenset(Scope))
+    assert (found.tenant, found.role, found.scopes) == ("farm", Role.PILOT, frozenset(USUAL_SCOPES))
     assert found.account.startswith("asha-")
     again = issuer.token(preferred_username="renamed", aerodaas_role="viewer", aud=["x", AUDIENCE])
     other = access(store, issuer).of(again, "10.0.0.1")

@@ -13,7 +13,7 @@ import hypothesis.strategies as st
 from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role, Scope
+from aerodaas.protocol.schemas import USUAL_SCOPES, LeaseIn, LeaseState, Role
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.leases.lease_table import Candidate, LeaseBook
 from aerodaas.service.store import Account, Lease, LeaseEnd, Store, Tenant
@@ -276,7 +276,7 @@ class KeptLeases(Leases):
         self.store = Store.open(Path(self.folder.name) / "service.db")
         for tenant in TENANTS:
             self.store.tenants.add(Tenant(tenant))
-        self.store.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(Scope), 0.0))
+        self.store.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(USUAL_SCOPES), 0.0))
         return self.store.leases
 
     def teardown(self) -> None:

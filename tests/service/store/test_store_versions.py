@@ -11,7 +11,7 @@ from sqlalchemy import create_engine, text
 from sqlalchemy.orm import Session
 from test_store_rows import LEASE, MISSION, USAGE
 
-from aerodaas.protocol.schemas import Role, Scope
+from aerodaas.protocol.schemas import USUAL_SCOPES, Role, Scope
 from aerodaas.service.errors import StoreError
 from aerodaas.service.store import Account, AuditEntry, RobotState, Store, Tenant, Token
 from aerodaas.service.store.migrations import MIGRATIONS, VERSION
@@ -61,7 +61,7 @@ def test_what_an_earlier_version_has_kept_is_there(
                 Tenant("t", 1.0, 2.0, 3.0, 5, 2**40, 6.5, 7.5),
             ]
             assert store.accounts.all() == [
-                Account("pilot", "farm", Role.PILOT, frozenset(Scope), 0.0),
+                Account("pilot", "farm", Role.PILOT, frozenset(USUAL_SCOPES), 0.0),
                 Account("x", "farm", Role.ADMIN, frozenset(), 1.0, True, "https://issuer 7"),  # noqa: FBT003
             ]
             scopes = frozenset({Scope.FLY, Scope.SENSE})
