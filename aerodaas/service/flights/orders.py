@@ -101,7 +101,9 @@ class FlightOrder(_Record):
     speed: Literal["max"] | float = 1.0
     """Mission seconds a wall second; `max`: as fast as the machine goes, in simulated time,
     where all robots are simulated."""
-    seed: int | None = None
+    seeds: list[int] = Field(default_factory=list)
+    """Of wind, noise and a simulated world: one for each flight of a rehearsal; a flight has the
+    first. None is the environment's own."""
     address: str | None = None
     """Ray cluster to join; None for one of its own."""
     edge: EdgeShare | None = None
@@ -117,6 +119,11 @@ class FlightOrder(_Record):
     battery: dict[str, float] = Field(default_factory=dict)
     """Charge by robot, 0 to 1, with which the rehearsal begins."""
     others: list[OtherLease] = Field(default_factory=list)
+
+    @property
+    def seed(self) -> int | None:
+        """Seed of the next flight; None for the environment's own."""
+        return self.seeds[0] if self.seeds else None
 
     @classmethod
     def read(cls, path: Path) -> FlightOrder:
@@ -296,6 +303,7 @@ class FlightOrders:
     def _order(self, mission: Mission, lease: str, granted: Lease | None) -> FlightOrder:
         minutes = float(mission.request["minutes"])
         tenant = self._store.tenants.require(mission.tenant)
+        seed = mission.request["seed"]
         ends = None if granted is None else granted.ends
         return FlightOrder(
             mission=mission.id,
@@ -312,7 +320,7 @@ class FlightOrders:
             silence=mission.request["silence"],
             silence_seconds=mission.request["silence_seconds"],
             speed=self._settings.speed,
-            seed=mission.request["seed"],
+            seeds=[] if seed is None else [seed],
             address=self._settings.address,
             edge=self._edge(mission.tenant),
         )
