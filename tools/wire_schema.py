@@ -20,6 +20,7 @@ from aerodaas.mission.commands import Answer
 from aerodaas.protocol.live import EndMessage, ItemMessage, LeftOutMessage, StateMessage
 from aerodaas.protocol.piloting import ControlsOut, RearrangeIn, SteerIn
 from aerodaas.protocol.playback import PlaybackOut
+from aerodaas.protocol.proposals import ApprovalIn
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     AccountOut,
@@ -65,7 +66,7 @@ _ROBOT = create_model(
     "RobotConfig", __doc__="One drone of an environment, as far as the page draws it.", **_FIELDS
 )
 _CONFIG: tuple[type, ...] = (CameraConfig, _ROBOT)
-_IN: tuple[type, ...] = (CommandIn, NavigationIn, RearrangeIn, SteerIn, SurveyIn)
+_IN: tuple[type, ...] = (ApprovalIn, CommandIn, NavigationIn, RearrangeIn, SteerIn, SurveyIn)
 
 
 def schema_text() -> str:

@@ -360,6 +360,8 @@ class VerdictOut(AnswerModel):
     battery_used: float | None = None
     picture: str | None = None
     """Path of a PNG of the flight, at this service."""
+    tracks: dict[str, list[Place]] = Field(default_factory=dict)
+    """Way that each robot flew in the air, coarse enough for a page to draw."""
     seeds: list[int] = Field(default_factory=list)
     """Seeds of the flights in simulation; each had to be good."""
     clearance: ClearanceOut | None = None

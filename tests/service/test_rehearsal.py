@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from pathlib import Path
 from typing import Any
 
@@ -123,6 +125,11 @@ def test_a_good_flight_is_approved_and_the_same_one_near_another_lease_is_not(
     assert good.distance == pytest.approx(24.0, abs=3.0)
     assert good.battery_used is not None
     assert 0.005 < good.battery_used < 0.05
+    track = good.tracks["drone"]
+    assert len(track) < 100
+    assert max(math.dist(one, other) for one, other in itertools.pairwise(track)) < 1.0
+    for east, north in ((6.0, 0.0), (6.0, 6.0), (0.0, 0.0)):
+        assert min(math.dist((east, north), place[:2]) for place in track) < 1.0
     near = judge(flown.recording, flown.config, minutes=2, others=[AHEAD])
     assert not near.approved
     assert "flew into the area of lease b7" in near.reasons[0]

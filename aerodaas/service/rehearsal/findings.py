@@ -11,6 +11,7 @@ import shapely
 from numpy.typing import NDArray
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.messages.mission import Place
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.protocol.schemas import VerdictOut
 from aerodaas.recording.reader import Recording
@@ -48,6 +49,9 @@ _FAILURES = frozenset(
 )
 """Kinds of alerts that tell of a failure; all others are an application's own results, or have a
 finding of their own."""
+_TRACK_POINTS = 160
+_TRACK_STEP = 0.5
+"""Least metres between two places of a track."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,23 @@ def _landing_time(robot: RobotFlight) -> float | None:
     return last.start if last is not None and last.state == "landed" else None
 
 
+def _flown(flight: RobotFlight) -> NDArray[np.float64]:
+    """Positions of a robot in the air, shape (N, 3)."""
+    return flight.position[~np.isin(np.array(flight.state_at(flight.time)), _GROUND)]
+
+
+def _track(flight: RobotFlight) -> list[Place]:
+    """Way of a robot at `_TRACK_POINTS` places or fewer, as far apart as each other."""
+    places = _flown(flight)
+    places = places[np.isfinite(places).all(axis=1)]
+    if not len(places):
+        return []
+    along = np.insert(np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)), 0, 0.0)
+    count = int(min(_TRACK_POINTS, 2 + along[-1] / _TRACK_STEP))
+    kept = np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], count)))
+    return [(x, y, z) for x, y, z in places[kept].round(1).tolist()]
+
+
 class _RobotFindings:
     """Findings about one robot."""
 
@@ -100,8 +121,7 @@ class _RobotFindings:
         self._limits = robot.limits
         self._flight = flight
         self._minutes = minutes
-        states = np.array(flight.state_at(flight.time))
-        self._path: NDArray[np.float64] = flight.position[~np.isin(states, _GROUND), :2]
+        self._path: NDArray[np.float64] = _flown(flight)[:, :2]
         """Positions in the air, shape (N, 2)."""
 
     def all(self, others: Iterable[OtherLease]) -> Iterator[Finding]:
@@ -254,4 +274,5 @@ def judge(
         seconds=max(landings, default=None),
         distance=sum(robot.distance for robot in robots),
         battery_used=float(sum(known[0] - known[-1] for known in charges if len(known))),
+        tracks={name: _track(robot) for name, robot in flight.robots.items() if robot.bands},
     )
