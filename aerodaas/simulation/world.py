@@ -34,7 +34,17 @@ from aerodaas.simulation.scenario import (
 from aerodaas.simulation.skeleton import KEYPOINTS, Posture, joints
 from aerodaas.simulation.track import Track
 
-__all__ = ["CAR_SIZE", "ROOF_RISE", "Box", "State", "Thing", "World"]
+__all__ = [
+    "CAR_SIZE",
+    "EAVES",
+    "ROOF_RISE",
+    "Box",
+    "State",
+    "Thing",
+    "World",
+    "crown_clumps",
+    "rng_of",
+]
 
 _SIGNS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 
@@ -82,8 +92,20 @@ CAR_SIZE = (4.2, 1.8, 1.45)
 ROOF_RISE = 0.35
 """Ratio of a gable roof's rise to half the width of its building."""
 
+EAVES = 0.45
+"""Overhang of a gable roof over the walls, metres."""
+
 CROWN_SHARE = 0.36
 """Ratio of a tree's crown radius to its height."""
+
+TRUNK_SHARE = 0.035
+"""Ratio of a trunk's radius to the tree's height."""
+
+LEAF_FLATNESS = 0.88
+"""Ratio of the height of a clump of leaves to its width."""
+
+TOWER_TAPER = 0.22
+"""Ratio of a tower's width at the top to that at the foot."""
 
 _BRISK = 1.3
 """Walking speed in m/s at which the legs swing fully."""
@@ -280,6 +302,30 @@ class World:
     def boxes(self, time: float) -> list[Box]:
         """Boxes around all objects at `time` seconds."""
         return [box for thing in self.things for box in thing.boxes(time)]
+
+
+def rng_of(thing: Thing) -> np.random.Generator:
+    """Random generator of an object's appearance, the same in every process."""
+    return np.random.default_rng(list(thing.seed.encode()))
+
+
+def crown_clumps(
+    thing: Thing, rng: np.random.Generator
+) -> list[tuple[tuple[float, float, float], float]]:
+    """Clumps of leaves of a tree's crown: each one's centre from the tree's foot, and its radius.
+
+    Args:
+        thing: The tree.
+        rng: Generator of its appearance, as it is at first.
+    """
+    radius, middle = CROWN_SHARE * thing.height, 0.62 * thing.height
+    clumps = [((0.0, 0.0, middle), 0.76), ((0.0, 0.0, middle + 0.42 * radius), 0.52)]
+    for k in range(5):
+        angle = math.tau * k / 5 + rng.uniform(-0.3, 0.3) + thing.yaw
+        out, up = 0.5 * radius, rng.uniform(-0.25, 0.12) * radius
+        centre = (out * math.cos(angle), out * math.sin(angle), middle + up)
+        clumps.append((centre, rng.uniform(0.44, 0.54)))
+    return [(centre, share * radius) for centre, share in clumps]
 
 
 def _place(

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 
 from aerodaas.recording.report.flight import Band
+from aerodaas.simulation.collision import BODY, Obstacles
 from missions.evidence import Evidence
 
 __all__ = [
@@ -29,12 +30,8 @@ __all__ = [
     "states",
 ]
 
-BODY = 0.2
-"""Metres around the drone's centre that must stay free."""
 PLANNING = 0.5
 """Seconds for which a drone may hover until it knows where to fly next."""
-_SOFT = frozenset({"crop_rows"})
-"""What may be flown through: young plants, lower than a landing drone is tall."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,12 +222,13 @@ def landed(*, at_home: float | None = None, speed: float = 1.0) -> Criterion:
 def hit_nothing(evidence: Evidence) -> Check:
     """Nothing of the world came within the drone's own size while it flew."""
     touched: dict[str, float] = {}
+    obstacles = Obstacles(evidence.world)
     pairs = zip(evidence.time[evidence.airborne], evidence.position[evidence.airborne], strict=True)
     for time, place in list(pairs)[::2]:
         x, y, z = (float(axis) for axis in place)
-        for box in evidence.world.boxes(float(time)):
-            if box.label not in _SOFT and box.contains((x, y, z), BODY):
-                touched.setdefault(box.id, float(time))
+        near = obstacles.within((x, y, z), float(time), BODY)
+        if near is not None:
+            touched.setdefault(near.thing, float(time))
     found = ", ".join(f"{name} at {time:.1f} s" for name, time in touched.items()) or "nothing"
     return Check("hit nothing", not touched, found)
 

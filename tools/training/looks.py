@@ -12,10 +12,9 @@ from aerodaas.simulation.scenario import Person
 from aerodaas.simulation.scene.buildings import TowerLook
 from aerodaas.simulation.scene.cars import CarShape
 from aerodaas.simulation.scene.people import Outfit
-from aerodaas.simulation.scene.plants import rng_of
 from aerodaas.simulation.scene.scene import ObjectAppearance
 from aerodaas.simulation.scene.textures import Palette, VestCut
-from aerodaas.simulation.world import Thing, World
+from aerodaas.simulation.world import Thing, World, rng_of
 from tools.training.colours import any_colour, cloth, hi_vis
 from tools.training.garments import draw_garment
 

@@ -14,14 +14,10 @@ from aerodaas.simulation.scenario import Building, Fence, Tower
 from aerodaas.simulation.scene.layers import LABEL, attach
 from aerodaas.simulation.scene.light import Light
 from aerodaas.simulation.scene.mesh import Mesh, box, merged, sheet, tube
-from aerodaas.simulation.scene.plants import rng_of
 from aerodaas.simulation.scene.textures import Palette
-from aerodaas.simulation.world import ROOF_RISE, Thing
+from aerodaas.simulation.world import EAVES, ROOF_RISE, TOWER_TAPER, Thing, rng_of
 
 __all__ = ["TowerLook", "add_building", "add_fence", "add_tower", "beam"]
-
-_EAVES = 0.45
-"""Overhang of a roof over the walls, metres."""
 
 _BAY = 3.0
 """Length of a plastered wall per window, metres."""
@@ -121,8 +117,8 @@ def _gables(length: float, width: float, height: float) -> Mesh:
 
 def _gable_roof(length: float, width: float, height: float) -> Mesh:
     slope = ROOF_RISE
-    x, y = length / 2 + _EAVES, width / 2 + _EAVES
-    ridge, eaves = height + slope * width / 2 + 0.04, height - slope * _EAVES + 0.04
+    x, y = length / 2 + EAVES, width / 2 + EAVES
+    ridge, eaves = height + slope * width / 2 + 0.04, height - slope * EAVES + 0.04
     run = math.hypot(y, ridge - eaves)
     uv = np.array([(0, 0), (2 * x, 0), (2 * x, run), (0, run)]) / 2.2
     south = sheet([(-x, -y, eaves), (x, -y, eaves), (x, 0, ridge), (-x, 0, ridge)], uv)
@@ -235,7 +231,7 @@ class TowerLook:
         (0.95, 0.95, 0.95),
     )
     """Alternating colours of its bands, from the foot."""
-    taper: float = 0.22
+    taper: float = TOWER_TAPER
     """Ratio of the width at the top to that at the foot."""
     section: float = 2.4
     """Approximate distance of two rings of bars, metres."""

@@ -13,9 +13,8 @@ from panda3d.core import NodePath
 from aerodaas.simulation.scenario import Car
 from aerodaas.simulation.scene.layers import LABEL, attach
 from aerodaas.simulation.scene.mesh import Mesh, merged, sheet, tube
-from aerodaas.simulation.scene.plants import rng_of
 from aerodaas.simulation.scene.textures import Palette
-from aerodaas.simulation.world import State, Thing
+from aerodaas.simulation.world import State, Thing, rng_of
 
 __all__ = ["CarFigure", "CarShape"]
 

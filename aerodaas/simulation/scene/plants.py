@@ -14,7 +14,14 @@ from aerodaas.simulation.scene.layers import attach
 from aerodaas.simulation.scene.light import Light
 from aerodaas.simulation.scene.mesh import Mesh, blob, merged, sheet, tube
 from aerodaas.simulation.scene.textures import Palette
-from aerodaas.simulation.world import CROWN_SHARE, Thing
+from aerodaas.simulation.world import (
+    CROWN_SHARE,
+    LEAF_FLATNESS,
+    TRUNK_SHARE,
+    Thing,
+    crown_clumps,
+    rng_of,
+)
 
 __all__ = ["add_crops", "add_tree"]
 
@@ -29,11 +36,6 @@ _NEAR, _FAR = 22.0, 2000.0
 """Distances in metres up to which a tree is rendered in detail, and at all."""
 
 
-def rng_of(thing: Thing) -> np.random.Generator:
-    """Random generator of an object's appearance, the same in every process."""
-    return np.random.default_rng(list(thing.seed.encode()))
-
-
 def add_tree(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> None:
     """Attach a broad-leaved tree: a trunk, and a crown of clumps of leaves.
 
@@ -45,12 +47,12 @@ def add_tree(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> 
     """
     rng, height = rng_of(thing), thing.height
     radius, middle = CROWN_SHARE * height, 0.62 * height
-    girth = 0.035 * height
+    girth = TRUNK_SHARE * height
     trunk = tube([1.5 * girth, girth, 0.75 * girth], [0, 0.12 * height, middle], sides=7)
     trunk = Mesh(trunk.points, trunk.uv * (2, 3), trunk.normals, trunk.colours, trunk.triangles)
     place = (thing.x, thing.y, 0.0)
     attach(parent, "trunk", trunk.moved(place).lit(light.sun), palette["bark"])
-    clumps = _clumps(radius, middle, thing.yaw, rng)
+    clumps = _clumps(thing, rng)
     tint = rng.uniform(0.85, 1.2) * np.array([rng.uniform(0.85, 1.2), 1.0, rng.uniform(0.7, 1.1)])
     detail = LODNode("crown")
     levels = parent.attach_new_node(detail)
@@ -74,16 +76,10 @@ class _Clump:
     phases: NDArray[np.float64]
 
 
-def _clumps(radius: float, middle: float, yaw: float, rng: np.random.Generator) -> list[_Clump]:
-    places = [((0.0, 0.0, middle), 0.76), ((0.0, 0.0, middle + 0.42 * radius), 0.52)]
-    for k in range(5):
-        angle = math.tau * k / 5 + rng.uniform(-0.3, 0.3) + yaw
-        out, up = 0.5 * radius, rng.uniform(-0.25, 0.12) * radius
-        centre = (out * math.cos(angle), out * math.sin(angle), middle + up)
-        places.append((centre, rng.uniform(0.44, 0.54)))
+def _clumps(thing: Thing, rng: np.random.Generator) -> list[_Clump]:
     return [
-        _Clump(centre, share * radius, 2.2 * rng.normal(size=(6, 3)), rng.uniform(0, math.tau, 6))
-        for centre, share in places
+        _Clump(centre, radius, 2.2 * rng.normal(size=(6, 3)), rng.uniform(0, math.tau, 6))
+        for centre, radius in crown_clumps(thing, rng)
     ]
 
 
@@ -92,7 +88,7 @@ def _ball(clump: _Clump, rings: int, sides: int) -> Mesh:
     ball = blob(clump.radius, rings=rings, sides=sides, repeat=3.0)
     # Waves are functions of the sphere's normals, and so are continuous at its seam.
     bumps = 1.0 + 0.25 * np.sin(ball.normals @ clump.waves.T + clump.phases).mean(axis=1)
-    points = ball.points * bumps[:, None] * (1.0, 1.0, 0.88)
+    points = ball.points * bumps[:, None] * (1.0, 1.0, LEAF_FLATNESS)
     return Mesh(points, ball.uv, ball.normals, ball.colours, ball.triangles).moved(clump.centre)
 
 

@@ -14,9 +14,8 @@ from aerodaas.simulation.scenario import Rubble
 from aerodaas.simulation.scene.layers import attach
 from aerodaas.simulation.scene.light import Light
 from aerodaas.simulation.scene.mesh import Mesh, box, merged
-from aerodaas.simulation.scene.plants import rng_of
 from aerodaas.simulation.scene.textures import Palette
-from aerodaas.simulation.world import Thing
+from aerodaas.simulation.world import Thing, rng_of
 
 __all__ = ["add_rubble"]
 

@@ -21,10 +21,10 @@ from aerodaas.simulation.scene.cars import CarFigure, CarShape
 from aerodaas.simulation.scene.ground import add_field, add_ground, add_road, add_shadow
 from aerodaas.simulation.scene.light import Light, sky_dome
 from aerodaas.simulation.scene.people import Outfit, PersonFigure
-from aerodaas.simulation.scene.plants import add_crops, add_tree, rng_of
+from aerodaas.simulation.scene.plants import add_crops, add_tree
 from aerodaas.simulation.scene.rubble import add_rubble
 from aerodaas.simulation.scene.textures import Palette
-from aerodaas.simulation.world import Thing, World
+from aerodaas.simulation.world import Thing, World, rng_of
 
 __all__ = ["ObjectAppearance", "Scene"]
 
