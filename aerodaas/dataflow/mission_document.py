@@ -22,13 +22,14 @@ from pydantic import (
 from typing_extensions import Self
 
 from aerodaas.config.checked import checked
+from aerodaas.dataflow.graph import AeroStreamData
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import ConfigError
 from aerodaas.identifiers import ScopedWord, Word
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.readings import Readings
-from aerodaas.messages.waypoints import LARGEST, Waypoint
+from aerodaas.messages.waypoints import LARGEST, NavigationType, SchedulingType, Waypoint
 from aerodaas.text.json_text import check_plain, read_json
 
 __all__ = [
@@ -199,6 +200,13 @@ class NavigationDocument(_Entry):
     """Seconds of mission time."""
     clear_on: ScopedWord | None = None
     """Stream whose first item empties the queue."""
+
+    def navigation(self, source: AeroStreamData[Any] | None = None) -> AeroNavigation:
+        """The navigation itself: by `source`, the stream that it names, or by its waypoints."""
+        ordering = SchedulingType.ORDERED if self.ordered else SchedulingType.UNORDERED
+        kind = NavigationType.DISTANCE_DRIVEN if source is None else NavigationType.ANALYTICS_DRIVEN
+        items = list(self.waypoints) if source is None else source
+        return AeroNavigation(kind, items, ordering, priority=self.priority)
 
 
 class MissionDocument(_Entry):

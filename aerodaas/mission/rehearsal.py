@@ -23,7 +23,7 @@ from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
-__all__ = ["give", "rehearse"]
+__all__ = ["give", "known_ground", "rehearse"]
 
 _ENDLESS = 1e6
 """Metres: floor and ceiling of an unbounded fence."""
@@ -76,7 +76,7 @@ def rehearse(
     known = robot.driver == "simulated" or not any(map(_is_relative, commands))
     planner = InlinePlanner(scheduler)
     sea_level = home.above_sea if home else None
-    clearance = _clearance(robot, environment, takeoff) if known else None
+    clearance = known_ground(robot, environment, takeoff) if known else None
     later = {
         # What the vehicle alone knows, or lies with it, its node checks.
         HeightReference.SEA: sea_level is None and robot.driver != "simulated",
@@ -123,10 +123,19 @@ def _waypoints(commands: Iterable[Command]) -> Iterable[Waypoint]:
             yield from command.navigation.waypoints
 
 
-def _clearance(
+def known_ground(
     robot: RobotConfig, environment: EnvironmentConfig, takeoff: Vector
 ) -> GroundClearance | None:
-    """The ground as the mission will know it; None where its files lie with the drone alone."""
+    """The ground as the mission will know it; None where its files lie with the drone alone.
+
+    Args:
+        robot: The robot that would fly.
+        environment: Home and terrain.
+        takeoff: Place of the take-off, ENU metres.
+
+    Raises:
+        ConfigError: As `GroundClearance.of`.
+    """
     terrain, home = environment.terrain, environment.home
     if terrain is None or home is None or not all(Path(file).exists() for file in terrain.files):
         return None

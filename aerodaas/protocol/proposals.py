@@ -120,7 +120,7 @@ class RobotForecast(_Answer):
 
 
 class CheckReport(_Answer):
-    """Result of the checks without flying."""
+    """Result of `aerodaas.documents.checking.check_document`: checks without flying."""
 
     passed: bool
     findings: list[Finding] = Field(default_factory=list)

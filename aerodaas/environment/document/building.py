@@ -29,7 +29,6 @@ from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.environment.document.values import ValueReader
 from aerodaas.environment.environment import Environment
 from aerodaas.errors import AeroDaaSError, GraphError
-from aerodaas.messages.waypoints import NavigationType, SchedulingType
 
 __all__ = ["build_mission"]
 
@@ -167,17 +166,11 @@ class _Builder:
         return self._works[trigger.target]
 
     def _navigate(self, entry: NavigationDocument) -> None:
-        ordering = SchedulingType.ORDERED if entry.ordered else SchedulingType.UNORDERED
         self._environment.get_robot_by_id(entry.robot)
-        if entry.stream is not None:
-            stream = self._stream(entry.stream, entry.robot)
-            if not issubclass(stream.item, AeroNavigation):
-                raise GraphError(f"{entry.robot} cannot navigate by {entry.stream}")
-            source: Any = stream
-        else:
-            source = list(entry.waypoints)
-        driven = NavigationType.ANALYTICS_DRIVEN if entry.stream else NavigationType.DISTANCE_DRIVEN
-        navigation = AeroNavigation(driven, source, ordering, priority=entry.priority)
+        source = None if entry.stream is None else self._stream(entry.stream, entry.robot)
+        if source is not None and not issubclass(source.item, AeroNavigation):
+            raise GraphError(f"{entry.robot} cannot navigate by {entry.stream}")
+        navigation = entry.navigation(source)
         if entry.clear_on is not None:
             self._stream(entry.clear_on, entry.robot)
         self._environment.fly_by(

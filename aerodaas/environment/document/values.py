@@ -20,27 +20,12 @@ from aerodaas.analytics.base import Analytics, ResourceUse
 from aerodaas.analytics.models import DETECTOR
 from aerodaas.analytics.models.cache import fetched_path, model_folder, model_named
 from aerodaas.config.plugins import load_plugin, plugin_names
+from aerodaas.documents.arguments import CONDITIONS, SETTINGS
 from aerodaas.environment.environment import Environment
 from aerodaas.errors import AeroDaaSError, GraphError
 
 __all__ = ["ValueReader", "ValueWriter", "registered_name"]
 
-_CLASSES = {
-    "Above": "aerodaas.analytics.conditions:Above",
-    "Below": "aerodaas.analytics.conditions:Below",
-    "FollowGains": "aerodaas.following.follow_settings:FollowGains",
-    "FollowLimits": "aerodaas.following.follow_settings:FollowLimits",
-    "LostPolicy": "aerodaas.following.follow_settings:LostPolicy",
-    "Near": "aerodaas.analytics.conditions:Near",
-    "TargetChoice": "aerodaas.following.follow_settings:TargetChoice",
-    "TargetSize": "aerodaas.following.target:TargetSize",
-}
-"""Dataclasses that a document may hold."""
-_CONDITIONS = {
-    "fallen": "aerodaas.analytics.people.body_pose:fallen",
-    "hand_raised": "aerodaas.analytics.people.body_pose:hand_raised",
-}
-"""Functions that a trigger may have for its condition."""
 _OUTPUT = Path("runs")
 """Folder, in the working directory, of all that a document's analyses write."""
 
@@ -129,10 +114,10 @@ class ValueWriter:
         if isinstance(value, Analytics):
             name, settings = self.analysis(value)
             return {"$analysis": name, "settings": settings}
-        for name, target in _CLASSES.items():
+        for name, target in SETTINGS.items():
             if type(value) is _imported(target):
                 return {"$settings": name, "of": self._fields(value, place)}
-        for name, target in _CONDITIONS.items():
+        for name, target in CONDITIONS.items():
             if value is _imported(target):
                 return {"$condition": name}
         return None
@@ -248,12 +233,12 @@ class ValueReader:
         match content:
             case {"$environment": "handle", **rest} if not rest:
                 return self._environment
-            case {"$condition": str(name), **rest} if not rest and name in _CONDITIONS:
-                return _imported(_CONDITIONS[name])
+            case {"$condition": str(name), **rest} if not rest and name in CONDITIONS:
+                return _imported(CONDITIONS[name])
             case {"$analysis": str(name), "settings": dict(settings), **rest} if not rest:
                 return self.analysis(name, settings)
-            case {"$settings": str(name), "of": dict(of), **rest} if not rest and name in _CLASSES:
-                return self.made(_imported(_CLASSES[name]), of, f"{place}: {name}")
+            case {"$settings": str(name), "of": dict(of), **rest} if not rest and name in SETTINGS:
+                return self.made(_imported(SETTINGS[name]), of, f"{place}: {name}")
         raise GraphError(f"{place}: there is no {kind} {str(content[kind])[:40]!r} here")
 
     def _resource(self, content: Any, use: ResourceUse, place: str) -> Any:  # noqa: ANN401
