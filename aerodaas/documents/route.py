@@ -15,6 +15,7 @@ import shapely
 from aerodaas.config.model import EnvironmentConfig, LimitsConfig, RobotConfig
 from aerodaas.dataflow.mission_document import NavigationDocument
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.documents.clearance import StandingObstacles
 from aerodaas.errors import AeroDaaSError, ConfigError, InvalidWaypointError
 from aerodaas.geometry.energy import EnergyModel
 from aerodaas.geometry.frames import Vector, length
@@ -44,6 +45,8 @@ class _Leg:
 
     target: str
     """Id of the waypoint; empty for the way up and home."""
+    points: Sequence[Vector]
+    """Its corners, ENU metres."""
     distance: float
     seconds: float
     charge: float
@@ -160,6 +163,7 @@ class RouteCheck:
         home = route.way_home(here)
         yield from self._deadline_findings(route, order)
         yield from self._charge_findings(route, order, legs)
+        yield from self._clearance_findings([*legs, home])
         seconds = route.climb.seconds + sum(leg.seconds for leg in (*legs, home))
         if self.minutes is not None and seconds > 60.0 * self.minutes:
             yield self._finding(
@@ -256,6 +260,31 @@ class RouteCheck:
                 )
                 return
 
+    def _clearance_findings(self, legs: Sequence[_Leg]) -> Iterator[Finding]:
+        """Places of the way that are too near to what stands in the simulated world."""
+        if self.robot.driver != "simulated":
+            return
+        try:
+            obstacles = StandingObstacles(self.config.simulation)
+        except ConfigError as error:
+            yield self._finding("document", f"simulation.{error}", "have the provider mend it")
+            return
+        for leg in legs:
+            for one in obstacles.along(leg.points):
+                thing = one.nearest
+                towards = f"to {leg.target!r}" if leg.target else "home"
+                yield self._finding(
+                    "clearance",
+                    f"the way {towards} comes to {thing.distance:.1f} m from the {thing.label} "
+                    f"{thing.thing} at {_place(one.place)}, and {one.limit:g} m are kept",
+                    "fly around it or higher, by a waypoint more",
+                    waypoint=leg.target or None,
+                    place=_triple(one.place),
+                    measured=thing.distance,
+                    limit=one.limit,
+                    unit="m",
+                )
+
 
 class _Route:
     """The way of one robot: order of its waypoints, and distance, time and charge of each leg."""
@@ -279,7 +308,7 @@ class _Route:
         up = limits.takeoff_height
         self.above_start = start + np.array([0.0, 0.0, up])
         climb = energy.leg(start, self.above_start, limits.max_climb)
-        self.climb = _Leg("", up, up / limits.max_climb, climb)
+        self.climb = _Leg("", (start, self.above_start), up, up / limits.max_climb, climb)
 
     def order(
         self,
@@ -364,17 +393,18 @@ class _Route:
         stay = waypoint.hover_duration
         charge = sum(self._energy.leg(*pair, speed) for pair in pairs) + self._energy.hover(stay)
         seconds = self.seconds(distance, float(there[2] - here[2]), waypoint) + stay
-        return _Leg(waypoint.id, distance, seconds, charge)
+        return _Leg(waypoint.id, points, distance, seconds, charge)
 
     def way_home(self, here: Vector) -> _Leg:
         """The way to above the start, and the landing there."""
         above = np.array([self._start[0], self._start[1], here[2]])
         corners = self._corners(here, above) or [(here[0], here[1]), (above[0], above[1])]
-        level = float(shapely.length(shapely.LineString(corners)))
+        points = [np.array([*corner, here[2]]) for corner in corners]
+        level = sum(length(end - begin) for begin, end in pairwise(points))
         down = max(0.0, float(here[2] - self._start[2]))
         seconds = level / self.cruise + down / _DESCENT
         charge = self._energy.way_home(here, self._start, self.cruise)
-        return _Leg("", level + down, seconds, charge)
+        return _Leg("", points, level + down, seconds, charge)
 
     def _speed(self, waypoint: Waypoint) -> float:
         return min(waypoint.speed or self.cruise, self._robot.limits.max_speed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -195,6 +196,44 @@ def test_an_analysis_that_flies_keeps_to_the_heights(
     """The height is an argument of the analysis."""
     found = only(check_document(followed(analysis(name, **arguments)), config()))
     assert found.check == check
+
+
+@pytest.mark.parametrize(
+    ("stops", "thing"),
+    [
+        ([{"x": 24, "y": 17, "z": 2}], "barn"),
+        ([{"x": 5, "y": 17, "z": 3.4}, {"x": 36, "y": 17, "z": 3.4}], "barn"),
+        ([{"x": 30, "y": 2, "z": 8}, {"x": 20, "y": 30, "z": 9}], ""),
+    ],
+)
+def test_a_way_through_what_stands_in_the_simulated_world_is_found(
+    stops: list[dict[str, Any]], thing: str
+) -> None:
+    """Into the barn, through it between two free places, and over it."""
+    limits = {**CONTENT["robots"][0]["limits"], "geofence": {}}
+    simulated = {**CONTENT["robots"][0], "limits": limits}
+    content = {**CONTENT, "robots": [simulated], "simulation": {"world": "field"}}
+    report = check_document(mission(*stops), validated(content, "the environment"))
+    found = [one for one in report.findings if one.check == "clearance"]
+    assert report.passed is not bool(thing)
+    assert all(thing in one.text and one.measured is not None for one in found)
+    assert bool(found) is bool(thing)
+    link = {"driver": "mavlink", "settings": {"url": "udpin:127.0.0.1:14540"}}
+    real = {**simulated, **link}
+    elsewhere = validated({**content, "robots": [real]}, "the environment")
+    assert check_document(mission(*stops), elsewhere).passed
+
+
+def test_a_way_keeps_two_metres_above_people_who_stand(tmp_path: Path) -> None:
+    """A waypoint 1 m over a head is found, one 3 m over it is not."""
+    world = tmp_path / "world.json"
+    somebody = {"kind": "person", "id": "ann", "at": [6, 0], "height": 1.7}
+    world.write_text(json.dumps({"name": "one", "entities": [somebody]}))
+    environment = validated({**CONTENT, "simulation": {"world": str(world)}}, "the environment")
+    low = check_document(mission({"x": 6, "z": 2.7}), environment)
+    assert {one.check for one in low.findings} == {"clearance"}
+    assert "ann" in low.findings[0].text
+    assert check_document(mission({"x": 6, "z": 5}), environment).passed
 
 
 OTHER_ROBOT = [{"robot": "dron", "waypoints": [{"id": "a", "x": 1, "y": 1, "z": 2}]}]
