@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import json
 import os
 import shutil
 import signal
@@ -13,6 +15,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+from pydantic import BaseModel
 
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.errors import MissionError
@@ -31,14 +35,23 @@ from aerodaas.service.flights.orders import FlightOrder, Outcome
 from aerodaas.service.models.model_store import ModelStore
 from aerodaas.service.store import Lease, Mission, Usage
 
-__all__ = ["CANCELLED_BY", "FOLLOWING", "ActiveMission", "LostFlightError", "shown", "usage_of"]
+__all__ = [
+    "CANCELLED_BY",
+    "FOLLOWING",
+    "ActiveMission",
+    "LostFlightError",
+    "fingerprint_of",
+    "shown",
+    "usage_of",
+]
 
 _P = MissionPhase
 FOLLOWING = {
+    _P.PROPOSED: {_P.REHEARSING, _P.AWAITING_APPROVAL, _P.CANCELLED},
     _P.SUBMITTED: {_P.REHEARSING, _P.AWAITING_APPROVAL, _P.QUEUED, _P.REFUSED, _P.CANCELLED},
-    _P.REHEARSING: {_P.AWAITING_APPROVAL, _P.QUEUED, _P.REFUSED, _P.CANCELLED},
-    _P.AWAITING_APPROVAL: {_P.QUEUED, _P.REFUSED, _P.CANCELLED},
-    _P.QUEUED: {_P.FLYING, _P.REFUSED, _P.CANCELLED, _P.FAILED},
+    _P.REHEARSING: {_P.PROPOSED, _P.AWAITING_APPROVAL, _P.QUEUED, _P.REFUSED, _P.CANCELLED},
+    _P.AWAITING_APPROVAL: {_P.PROPOSED, _P.QUEUED, _P.REFUSED, _P.CANCELLED},
+    _P.QUEUED: {_P.PROPOSED, _P.FLYING, _P.REFUSED, _P.CANCELLED, _P.FAILED},
     _P.FLYING: {_P.LANDED, _P.CANCELLED, _P.FAILED},
 }
 """Phases that may follow each one."""
@@ -136,6 +149,11 @@ class ActiveMission:
             self.version += 1
 
     @property
+    def is_proposal(self) -> bool:
+        """Whether it was proposed, and flies by an approval of exactly what it is."""
+        return "proposal" in self.row.request
+
+    @property
     def attached_to(self) -> str | None:
         """The mission by whose cameras this one senses; None for one that flies itself."""
         found: str | None = self.row.request.get("attach")
@@ -158,11 +176,15 @@ class ActiveMission:
             order: Order of the flight.
             models: Models of the tenants.
         """
-        self.end_rehearsal()
-        shutil.rmtree(self.rehearsal.path, ignore_errors=True)
+        self.forget_rehearsal()
         self._prepare(self.rehearsal, order, models)
         self._rehearsing = start_process(self.rehearsal, tied=True, vehicles=False)
         self._rehearsed_since = time.monotonic()
+
+    def forget_rehearsal(self) -> None:
+        """End the rehearsal, and remove all that it has left."""
+        self.end_rehearsal()
+        shutil.rmtree(self.rehearsal.path, ignore_errors=True)
 
     def verdict(self, seconds: float) -> VerdictOut | None:
         """The rehearsal's verdict; None while it goes on, at most so many wall seconds."""
@@ -326,6 +348,15 @@ def shown(active: ActiveMission) -> MissionOut:
         reasons = [without_folders(reason) for reason in verdict.reasons]
         news["verdict"] = verdict.model_copy(update={"reasons": reasons, "picture": picture})
     return answer.model_copy(update=news)
+
+
+def fingerprint_of(submission: BaseModel) -> str:
+    """SHA-256 of a submission's content, hexadecimal; the order of its keys makes no difference.
+
+    What was left out counts as such: a later version's defaults change no fingerprint.
+    """
+    content = submission.model_dump(mode="json", exclude_unset=True)
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def usage_of(mission: Mission, outcome: Outcome, recording: Path) -> Usage:

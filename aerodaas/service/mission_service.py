@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import itertools
-import json
 import logging
 import secrets
 import threading
@@ -22,6 +20,7 @@ from aerodaas.messages.health import HealthReport
 from aerodaas.messages.mission import MissionState, RobotStatus
 from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.mission.commands import Answer
+from aerodaas.protocol.proposals import ApprovalIn
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     LeaseState,
@@ -42,9 +41,18 @@ from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.folder import FlightFolder, RobotLocks
 from aerodaas.service.flights.orders import FlightOrder, FlightOrders
 from aerodaas.service.leases.lease_service import LeaseService
-from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError, shown, usage_of
+from aerodaas.service.mission import (
+    CANCELLED_BY,
+    ActiveMission,
+    LostFlightError,
+    fingerprint_of,
+    shown,
+    usage_of,
+)
+from aerodaas.service.mission_table import MissionTable
 from aerodaas.service.models.model_store import ModelStore, require_room
 from aerodaas.service.monitor.process import FleetMonitor
+from aerodaas.service.proposal_service import ProposalService
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store
 
@@ -69,10 +77,12 @@ class MissionService:
         registry: FleetRegistry,
         models: ModelStore,
         monitor: FleetMonitor | None = None,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Take up the missions that the database has; `start` moves them on.
 
-        `monitor` holds the drones that no mission flies; None for nobody.
+        `monitor` holds the drones that no mission flies; None for nobody. Approvals lapse by
+        `clock`, in seconds as of `time.monotonic`.
         """
         self._settings = settings
         self._store = store
@@ -81,14 +91,23 @@ class MissionService:
         self._models = models
         self._monitor = monitor
         self._orders = FlightOrders(settings, store, leases, registry)
-        self._lock = threading.RLock()
+        self._table = MissionTable(store, settings.missions)
+        self._lock, self._missions = self._table.lock, self._table.missions
         self._closed = threading.Event()
         self._errors = RepeatedErrorLog(logging.getLogger(__name__))
         self._robot_locks = RobotLocks(settings.locks)
         self._robots = [robot.id for robot in settings.config.robots]
         self._texts: dict[str, tuple[int, str, bool]] = {}
         """Version, JSON and whether it is over, by mission that is watched."""
-        self._missions: dict[str, ActiveMission] = {}
+        self.proposals = ProposalService(
+            settings,
+            store,
+            self._table,
+            self._orders,
+            leases=leases,
+            registry=registry,
+            clock=clock,
+        )
         self._attachments = Attachments(settings, leases, self._missions)
         leases.flying = self._busy
         leases.on_end.append(self._tell_flights)
@@ -97,12 +116,12 @@ class MissionService:
         self._last_rehearsed: dict[str, int] = {}
         """Number of each tenant's last rehearsal."""
         self._rehearsal_places: dict[str, int] = {}
-        self._in_flight: dict[str, ActiveMission] = {}
+        self._in_flight: dict[str, ActiveMission] = {
+            id_: active
+            for id_, active in self._missions.items()
+            if active.phase is MissionPhase.FLYING
+        }
         """Missions of these that fly."""
-        for row in store.missions.open():
-            self._missions[row.id] = self._active(row)
-            if row.phase is MissionPhase.FLYING:
-                self._in_flight[row.id] = self._missions[row.id]
 
     def start(self) -> None:
         """Move missions on from now on, in a thread of its own."""
@@ -134,7 +153,7 @@ class MissionService:
         # First: what was taken in has used up its quota and its lease.
         earlier = self._submitted(principal, submission, key)
         if earlier is not None:
-            return earlier
+            return shown(earlier)
         self._require_open(principal.tenant)
         require_room(self._settings.state)
         attached = submission.attach is not None
@@ -159,64 +178,70 @@ class MissionService:
             robots=tuple(robots),
             lease=submission.lease,
             submitted=time.time(),
-            folder=str(self._path(name)),
+            folder=str(self._table.path(name)),
             request=submission.model_dump(mode="json", exclude={"document"}),
             key=key,
-            fingerprint=None if key is None else _fingerprint(submission),
+            fingerprint=None if key is None else fingerprint_of(submission),
         )
-        mission = self._active(row)
-        mission.write(submission.document)
-        with self._lock:
-            # The same submission may have been sent twice at once.
-            try:
-                earlier = self._submitted(principal, submission, key)
-                if earlier is None:
-                    self._require_open(principal.tenant)
-                    self._store.missions.add(row)
-                    self._missions[row.id] = mission
-            finally:
-                if row.id not in self._missions:
-                    mission.discard()
-        return earlier or shown(mission)
+
+        def find() -> ActiveMission | None:
+            found = self._submitted(principal, submission, key)
+            if found is None:
+                self._require_open(principal.tenant)
+            return found
+
+        return shown(self._table.add(row, submission.document, find))
 
     def _require_open(self, tenant: str) -> None:
         """Raise RefusedError for a tenant with as many missions that are not over as it may."""
         most = self._settings.most_open
-        if sum(active.row.tenant == tenant for active in list(self._missions.values())) >= most:
+        taken = [
+            active
+            for active in list(self._missions.values())
+            # Agents have a bound of their own, and keep no person from submitting.
+            if active.row.tenant == tenant and active.phase is not MissionPhase.PROPOSED
+        ]
+        if len(taken) >= most:
             raise RefusedError(
                 429, f"{tenant} has {most} missions that are not over: wait for one, or cancel some"
             )
 
     def _submitted(
         self, principal: Principal, submission: MissionIn, key: str | None
-    ) -> MissionOut | None:
+    ) -> ActiveMission | None:
         """The mission that this submission has become; None if it was not sent before."""
         row = None if key is None else self._store.missions.of_key(principal.tenant, key)
         if row is None:
             return None
-        if row.fingerprint != _fingerprint(submission):
+        if row.fingerprint != fingerprint_of(submission):
             raise RefusedError(
                 422,
                 f"another mission was submitted with this Idempotency-Key ({row.id}): send a "
                 "new key with each new mission",
             )
-        return self._with_state(row)
+        return self._table.of_row(row)
 
-    def approve(self, principal: Principal, mission: str) -> MissionOut:
+    def approve(
+        self, principal: Principal, mission: str, approval: ApprovalIn | None = None
+    ) -> MissionOut:
         """Approve a mission that waits for it.
 
         Args:
             principal: The account that approves.
             mission: Id of the mission.
+            approval: What exactly is approved, of a proposal; None for any other mission.
         """
         with self._lock:
-            active = self._open(mission)
+            active = self._table.open(mission)
             if active.phase is not MissionPhase.AWAITING_APPROVAL:
                 raise RefusedError(
                     409, f"{mission} does not wait for approval: {active.phase.value}"
                 )
-            active.set_phase(MissionPhase.QUEUED, f"approved by {principal.account}")
-            return shown(active)
+            if active.is_proposal:
+                self.proposals.approve(principal, active, approval)
+            else:
+                active.set_phase(MissionPhase.QUEUED, f"approved by {principal.account}")
+            return self.proposals.shown(active)
 
     def cancel(self, principal: Principal, mission: str) -> MissionOut:
         """Cancel a mission; drones in flight come home first.
@@ -225,9 +250,11 @@ class MissionService:
             principal: The account that asks.
             mission: Id of the mission.
         """
-        self._require_own(principal, mission)
+        owner = self._table.require_own(principal, mission).row.account
+        if principal.agent and owner != principal.account:
+            raise RefusedError(403, f"{mission} is {owner}'s: an agent stops it, and no more")
         with self._lock:
-            active = self._open(mission)
+            active = self._table.open(mission)
             reason = f"{CANCELLED_BY}{principal.account}"
             if active.phase is not MissionPhase.FLYING:
                 active.end_rehearsal()
@@ -262,9 +289,9 @@ class MissionService:
             tenant: Tenant that may attach.
             sensors: Full ids of the cameras; None for none at all.
         """
-        self._require_own(principal, mission)
+        self._table.require_own(principal, mission)
         with self._lock:
-            active = self._open(mission)
+            active = self._table.open(mission)
             if sensors is None:
                 self._attachments.withdraw_grant(active, tenant)
             else:
@@ -287,8 +314,8 @@ class MissionService:
 
     def _flown(self, principal: Principal, mission: str) -> ActiveMission:
         """A flying mission; raises RefusedError unless this account may command it."""
-        self._require_own(principal, mission)
-        active = self._open(mission)
+        self._table.require_own(principal, mission)
+        active = self._table.open(mission)
         if active.phase is not MissionPhase.FLYING:
             raise RefusedError(409, f"{mission} is not flying: {active.phase.value}")
         if active.attached_to is not None:
@@ -298,14 +325,14 @@ class MissionService:
 
     def mission(self, principal: Principal, mission: str) -> MissionOut:
         """As `Missions.mission`; the mission's own user counts as present."""
-        found = shown(self._seen(principal, mission))
+        found = self.proposals.shown(self._table.seen(principal, mission))
         if _is_user(principal, found):
             self.record_presence(mission)
         return found
 
     def scenery(self, principal: Principal, mission: str) -> SceneryOut:
         """Ground below a mission that this account may see."""
-        seed = self._seen(principal, mission).row.request.get("seed")
+        seed = self._table.seen(principal, mission).row.request.get("seed")
         return SceneryOut.of(self._settings.config, seed)
 
     def missions(self, principal: Principal) -> list[MissionOut]:
@@ -321,15 +348,14 @@ class MissionService:
             for row in (*rows, *(active.row for active in list(self._missions.values())))
         }
         return [
-            self._with_state(row)
+            shown(self._table.of_row(row))
             for row in sorted(found.values(), key=lambda row: row.submitted, reverse=True)
             if sees(principal, row.tenant, row.request.get("share", ()))
         ]
 
     def shown(self, mission: str) -> MissionOut:
         """A mission, whoever asks."""
-        # Without the lock, which is held while flights are asked: whoever watches does not wait.
-        return shown(self._any(mission))
+        return self._table.shown(mission)
 
     def text(self, mission: str) -> tuple[str, bool]:
         """A mission as JSON, made once for all that watch it, and whether it is over."""
@@ -363,7 +389,7 @@ class MissionService:
         Raises:
             RefusedError: If it may not.
         """
-        active = self._seen(principal, mission)
+        active = self._table.seen(principal, mission)
         if active.row.tenant != principal.tenant:
             raise RefusedError(403, f"{mission} is {active.row.tenant}'s")
         if active.attached_to is None:
@@ -381,7 +407,7 @@ class MissionService:
     ) -> Iterator[tuple[dict[str, Any], bytes]]:
         """Items of a flying mission's stream."""
         with self._lock:
-            active = self._open(mission)
+            active = self._table.open(mission)
             if active.phase is not MissionPhase.FLYING:
                 raise MissionError(f"{mission} is not flying")
             link = active.follow()
@@ -412,7 +438,7 @@ class MissionService:
         Raises:
             RefusedError: If there is none.
         """
-        active = self._seen(principal, mission)
+        active = self._table.seen(principal, mission)
         files = {"recording": active.flight.recording, "picture": active.rehearsal.picture}
         if not files[name].is_file() or (name == "recording" and not active.over):
             raise RefusedError(404, f"{mission} has no {name}")
@@ -428,7 +454,7 @@ class MissionService:
         Raises:
             RefusedError: If the mission is another tenant's, goes on, or has no recording.
         """
-        self._require_own(principal, mission)
+        self._table.require_own(principal, mission)
         self.file(principal, mission, "recording").unlink(missing_ok=True)
         # A flight whose process was killed has told of no usage.
         if self._store.usage.get(mission) is not None:
@@ -501,9 +527,10 @@ class MissionService:
             self._errors.log_recovery(active.row.id)
 
     def _step(self, active: ActiveMission) -> None:
-        steps: dict[MissionPhase, Callable[[ActiveMission], None]] = {
+        steps: dict[MissionPhase, Callable[[ActiveMission], object]] = {
             MissionPhase.SUBMITTED: self._begin,
             MissionPhase.REHEARSING: self._judge,
+            MissionPhase.AWAITING_APPROVAL: self.proposals.has_lapsed,
             MissionPhase.QUEUED: self._take_off,
             MissionPhase.FLYING: self._watch,
         }
@@ -522,7 +549,9 @@ class MissionService:
         if place := self._rehearsal_places.get(active.row.id, 1):
             active.set_waiting(f"waits for its rehearsal: number {place} of those that wait")
             return
-        active.rehearse(self._orders.rehearsal(active.row), self._models)
+        order = self._orders.rehearsal(active.row)
+        self.proposals.begin(active, order)
+        active.rehearse(order, self._models)
         self._last_rehearsed[active.row.tenant] = next(self._rehearsals)
         if active.phase is not MissionPhase.REHEARSING:
             active.set_phase(MissionPhase.REHEARSING)
@@ -547,6 +576,9 @@ class MissionService:
         verdict = active.verdict(_REHEARSAL_SHARE * self._settings.rehearsal_seconds)
         if verdict is None:
             return
+        if active.is_proposal:
+            self.proposals.judge(active, verdict)
+            return
         active.row = replace(active.row, verdict=verdict.model_dump(mode="json"))
         if verdict.approved:
             self._admit(active)
@@ -560,6 +592,8 @@ class MissionService:
             active.set_phase(MissionPhase.QUEUED, "waits for its drones")
 
     def _take_off(self, active: ActiveMission) -> None:
+        if self.proposals.has_lapsed(active):
+            return
         if active.attached_to is not None:
             if self._has_place(active):
                 attached = self._attachments.share_cameras(active)
@@ -576,6 +610,7 @@ class MissionService:
             lease.state is LeaseState.GRANTED
             and self._has_place(active)
             and self._handed_over(active)
+            and not self.proposals.has_lapsed(active, limits=True)
         ):
             self._begin_flight(active, self._orders.flight(active.row, lease))
 
@@ -670,53 +705,10 @@ class MissionService:
         if active.row.lease is not None:
             self._leases.give_back(active.row)
 
-    def _active(self, row: Mission) -> ActiveMission:
-        return ActiveMission(row, Path(row.folder), self._store.missions.put)
-
-    def _path(self, mission: str) -> Path:
-        return self._settings.missions / mission
-
-    def _open(self, mission: str) -> ActiveMission:
-        active = self._missions.get(mission)
-        # One that is over stays among them until the next turn.
-        if active is None or active.over:
-            phase = self.shown(mission).phase.value
-            raise RefusedError(409, f"{mission} is over: {phase}")
-        return active
-
-    def _seen(self, principal: Principal, mission: str) -> ActiveMission:
-        """A mission that this account may see, over or not; raises RefusedError for any other."""
-        active = self._any(mission)
-        if not sees(principal, active.row.tenant, active.row.request.get("share", ())):
-            raise RefusedError(404, f"there is no mission {mission!r}")
-        return active
-
-    def _any(self, mission: str) -> ActiveMission:
-        """A mission that may be over; raises RefusedError if there is none."""
-        active = self._missions.get(mission)
-        return active or self._active(self._store.missions.require(mission))
-
-    def _with_state(self, row: Mission) -> MissionOut:
-        return shown(self._missions.get(row.id) or self._active(row))
-
-    def _require_own(self, principal: Principal, mission: str) -> None:
-        """Raise RefusedError unless this account may command a mission."""
-        tenant = self._seen(principal, mission).row.tenant
-        if tenant != principal.tenant and not principal.role.reaches(Role.OPERATOR):
-            raise RefusedError(403, f"{mission} is {tenant}'s: you may watch it")
-
-
-def _fingerprint(submission: MissionIn) -> str:
-    """SHA-256 of a submission's content, hexadecimal; the order of its keys makes no difference.
-
-    What was left out counts as such: a later version's defaults change no fingerprint.
-    """
-    content = submission.model_dump(mode="json", exclude_unset=True)
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
 
 def _is_user(principal: Principal, mission: MissionOut) -> bool:
-    return mission.tenant == principal.tenant and principal.role.reaches(Role.PILOT)
+    own = mission.tenant == principal.tenant and principal.role.reaches(Role.PILOT)
+    return own and not principal.agent
 
 
 def _may_fly(last: RobotStatus) -> bool:

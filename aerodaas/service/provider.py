@@ -32,10 +32,11 @@ from aerodaas.service.routes.leases import LeaseRoutes
 from aerodaas.service.routes.live import LiveRoutes
 from aerodaas.service.routes.missions import MissionRoutes, PilotingRoutes, extension_routers
 from aerodaas.service.routes.playback import PlaybackRoutes
+from aerodaas.service.routes.proposals import ProposalRoutes
 from aerodaas.service.routes.provisions import ProvisionRoutes
 from aerodaas.service.routes.submissions import SubmissionRoutes
 from aerodaas.service.settings import ServiceSettings
-from aerodaas.service.store import Store
+from aerodaas.service.store import Mission, Store
 
 __all__ = ["build_service"]
 
@@ -65,6 +66,11 @@ def build_service(
     missions = MissionService(
         settings, store, leases=leases, registry=registry, models=models, monitor=monitor
     )
+
+    def audit_lapse(proposal: Mission, text: str) -> None:
+        audit.write(None, "proposal.lapse", proposal.id, text, accepted=True, required=False)
+
+    missions.proposals.on_lapse = audit_lapse
     admission = Admission(access, audit)
     shown: dict[str, Any] = catalogue(settings.config).model_dump(mode="json", by_alias=True)
     fleet = FleetView(settings.config, shown, settings.actuators, registry, leases, missions, store)
@@ -93,6 +99,7 @@ def build_service(
         LeaseRoutes(leases, admission, audit),
         MissionRoutes(missions, admission),
         SubmissionRoutes(missions, admission, audit),
+        ProposalRoutes(missions.proposals, admission, audit),
         PilotingRoutes(missions, admission),
         PlaybackRoutes(player, admission),
         LiveRoutes(missions, admission),

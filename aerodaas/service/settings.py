@@ -49,6 +49,8 @@ class ServiceSettings:
     together, by their tenants' weights; None: each flight runs its own as it likes."""
     actuators: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """Actuators that a tenant may move, as `robot/actuator`; none for all others."""
+    hourly_rehearsals: int = 12
+    """Most rehearsals of an agent's proposals within an hour."""
     most_flights: int = 16
     """Most flights at once."""
     most_open: int = 50

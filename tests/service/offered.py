@@ -40,6 +40,10 @@ from aerodaas.service.monitor.reports import WatchedVehicle
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Account, Store, Tenant
 
+SUBMITTED_PHASES = [
+    phase for phase in MissionPhase if not phase.over and phase is not MissionPhase.PROPOSED
+]
+"""Phases of a mission that was submitted to be flown, until it is over."""
 PILOT = Principal("pilot", "farm", Role.PILOT, frozenset(USUAL_SCOPES), "t")
 
 
@@ -141,6 +145,8 @@ class Provider:
         self.store.tenants.add(Tenant("farm"))
         self.store.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(USUAL_SCOPES), 0.0))
         self._watched = watched
+        self.later = 0.0
+        """Seconds by which approvals are older than they would be."""
         self.open()
 
     def open(self) -> None:
@@ -156,6 +162,7 @@ class Provider:
             registry=self.registry,
             models=ModelStore(self.settings.models),
             monitor=cast("FleetMonitor", self.monitor) if self._watched else None,
+            clock=lambda: time.monotonic() + self.later,
         )
         self.fleet = FleetView(
             config,

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from flight_orders import order_in
-from offered import PILOT, Provider
+from offered import PILOT, SUBMITTED_PHASES, Provider
 from served import document, fleet, robot
 from test_mission_service import unwatched
 
@@ -87,7 +87,7 @@ def reach(served: Provider, phase: MissionPhase) -> MissionOut:
 
 
 @pytest.mark.parametrize("of_crowd", [MissionPhase.AWAITING_APPROVAL, MissionPhase.LANDED])
-@pytest.mark.parametrize("phase", [phase for phase in MissionPhase if not phase.over])
+@pytest.mark.parametrize("phase", SUBMITTED_PHASES)
 def test_a_restart_forgets_no_mission(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -20,6 +20,7 @@ from aerodaas.errors import ConfigError, SourceError
 from aerodaas.messages.health import HealthReport
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
+from aerodaas.protocol.proposals import ApprovalIn, ProposalIn, RehearseIn
 from aerodaas.protocol.schemas import (
     AccountIn,
     AccountOut,
@@ -201,9 +202,32 @@ class ProviderClient:
         path = f"/v1/missions/{_part(mission)}/grants/{_part(tenant)}"
         return self._ask(MissionOut, "DELETE", path)
 
-    def approve(self, mission: str) -> MissionOut:
-        """Approve a mission that waits for it, as an operator."""
-        return self._ask(MissionOut, "POST", f"/v1/missions/{_part(mission)}/approve")
+    def approve(self, mission: str, approval: ApprovalIn | None = None) -> MissionOut:
+        """Approve a mission that waits for it, as an operator.
+
+        Args:
+            mission: Id of the mission.
+            approval: What exactly is approved, of a proposal; None for a submitted mission.
+        """
+        return self._ask(MissionOut, "POST", f"/v1/missions/{_part(mission)}/approve", approval)
+
+    def propose(self, proposal: ProposalIn) -> MissionOut:
+        """Propose a mission, which nothing flies by; the same one again is the same proposal."""
+        return self._ask(MissionOut, "POST", "/v1/proposals", proposal)
+
+    def rehearse(self, mission: str, seeds: int = 3) -> MissionOut:
+        """Have a proposal flown in simulation.
+
+        Args:
+            mission: Id of the proposal.
+            seeds: Flights, each with another seed of gusts and noise, 1 to 5.
+        """
+        path = f"/v1/proposals/{_part(mission)}/rehearse"
+        return self._ask(MissionOut, "POST", path, RehearseIn(seeds=seeds))
+
+    def request_approval(self, mission: str) -> MissionOut:
+        """Ask for the approval of a proposal whose newest rehearsal was good."""
+        return self._ask(MissionOut, "POST", f"/v1/proposals/{_part(mission)}/request")
 
     def command(self, mission: str, command: CommandIn) -> Answer:
         """Give a robot of a flying mission a command.

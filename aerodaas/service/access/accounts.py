@@ -110,8 +110,10 @@ class Accounts:
         """Make an account, and its tenant without quotas if there is none of this name.
 
         Raises:
-            RefusedError: With status 409, if there is one of this name.
+            RefusedError: With status 409, if there is one of this name; 422 for an agent's that
+                may more than an agent.
         """
+        _require_separate(account.role, account.scopes)
         given = {**dict(account), "scopes": frozenset(account.scopes)}
         row = Account(**given, created=self._clock())
         with self._lock:
@@ -171,7 +173,7 @@ class Accounts:
 
         Raises:
             RefusedError: With status 404 for an unknown account; 409 if no administrator would
-                be left.
+                be left; 422 for an agent's account that would be more than that.
         """
         with self._lock:
             others = [
@@ -187,6 +189,7 @@ class Accounts:
                     scopes=row.scopes if scopes is None else frozenset(scopes),
                     disabled=row.disabled if disabled is None else disabled,
                 )
+                _require_separate(new.role, new.scopes)
                 if not others and (new.role is not Role.ADMIN or new.disabled):
                     raise RefusedError(409, "no administrator would be left: make another first")
                 return new
@@ -233,6 +236,24 @@ class Accounts:
         row = self._store.tokens.update(token, lambda row: replace(row, revoked=True))
         self.on_change(row.account)
         return row
+
+
+def _require_separate(role: Role, scopes: Collection[Scope]) -> None:
+    """Refuse an account that proposes missions, and could fly or approve them itself."""
+    if Scope.PROPOSE not in scopes:
+        return
+    if Scope.FLY in scopes:
+        raise RefusedError(
+            422,
+            "an account has either the scope fly or propose, for who proposes a mission does not "
+            "fly it: leave one out, or make two accounts",
+        )
+    if role is not Role.PILOT:
+        raise RefusedError(
+            422,
+            f"an account with the scope propose is an agent's, and has the role pilot, not "
+            f"{role.value}: people approve by accounts of their own",
+        )
 
 
 def _name_of(issued: Issued) -> str:
@@ -384,13 +405,12 @@ class Access:
         expires: float,
     ) -> Principal:
         """Principal of a valid token; remembered while the database does not answer."""
-        principal = Principal(
-            account=account.name,
-            tenant=account.tenant,
-            role=account.role,
-            scopes=scopes,
-            token=token,
-        )
+        agent, role = Scope.PROPOSE in account.scopes, account.role
+        if agent:
+            # An issuer may name another role, and an older row hold more.
+            scopes -= {Scope.FLY}
+            role = Role.PILOT if role.reaches(Role.PILOT) else role
+        principal = Principal(account.name, account.tenant, role, scopes, token, agent)
         with self._lock:
             # The database and the wall clock may fail together, as a machine starts.
             left = min(expires - self._clock(), _REMEMBERED)

@@ -83,6 +83,8 @@ class FleetView:
         lease = self._leases.holder(robot.id)
         news, ready = self._registry.report(robot.id), self._registry.preflight(robot.id)
         flying, shared = self._missions.shared(robot.id, principal.tenant)
+        if principal.agent:
+            shared = []
         mine = lease is not None and sees(principal, lease.tenant)
         # Only of a lease that this account sees.
         own = lease if mine else None

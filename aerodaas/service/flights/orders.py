@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -39,6 +40,7 @@ __all__ = [
     "OtherLease",
     "Outcome",
     "TenantLimits",
+    "actuators_of",
     "robots_of",
 ]
 
@@ -234,21 +236,14 @@ class FlightOrders:
             if sensor.type == "camera"
         }
         if cameras & set(document.sensors):
-            require(principal, Role.PILOT, Scope.SENSE)
+            require(principal, Role.PILOT, Scope.SENSE, agents=True)
         if document.analyses:
-            require(principal, Role.PILOT, Scope.COMPUTE)
+            require(principal, Role.PILOT, Scope.COMPUTE, agents=True)
 
     def _require_actuators(self, tenant: str, document: MissionDocument) -> None:
         """Raise RefusedError for a document that moves what the tenant may not."""
         may = self._settings.actuators.get(tenant, frozenset())
-        asked = {
-            f"{entry.robot}/{action.equipment}"
-            for entry in document.navigation
-            for waypoint in entry.waypoints
-            for action in waypoint.actions
-            if action.equipment
-        }
-        if refused := sorted(asked - may):
+        if refused := sorted(actuators_of(document) - may):
             raise RefusedError(
                 403,
                 f"{tenant} may not move {', '.join(refused)}: its provider says who moves "
@@ -258,10 +253,6 @@ class FlightOrders:
     def rehearsal(self, mission: Mission) -> FlightOrder:
         """The order of a mission's rehearsal, which begins with the drones' present charge."""
         order = self._order(mission, "rehearsal", None)
-        states = self._registry.states
-        battery = {
-            name: charge for name in mission.robots if (charge := states[name].battery) is not None
-        }
         others = [
             OtherLease(id=lease.id, area=list(lease.area))
             for lease in self._leases.granted()
@@ -275,11 +266,26 @@ class FlightOrders:
                 "rehearsal_bytes": self._settings.rehearsal_bytes,
                 "edge": None,
                 "speed": "max",
-                "battery": battery,
+                "seeds": self._seeds(mission),
+                "battery": self.charges(mission.robots),
                 "others": others,
                 "area": None if own is None or own.area is None else list(own.area),
             }
         )
+
+    def charges(self, robots: Iterable[str]) -> dict[str, float]:
+        """Present charge of those robots of which it is known, 0 to 1."""
+        states = self._registry.states
+        known = ((name, states[name].battery) for name in robots)
+        return {name: charge for name, charge in known if charge is not None}
+
+    def _seeds(self, mission: Mission) -> list[int]:
+        """Seeds of a rehearsal: the environment's own and those after it, for a proposal."""
+        if (proposal := mission.request.get("proposal")) is None:
+            seed = mission.request["seed"]
+            return [] if seed is None else [seed]
+        first = self._settings.config.simulation.seed
+        return list(range(first, first + proposal["seeds"]))
 
     def flight(self, mission: Mission, lease: Lease) -> FlightOrder:
         """The order of a mission's flight under a granted lease.
@@ -288,7 +294,14 @@ class FlightOrders:
             mission: The mission.
             lease: The lease, which is granted.
         """
-        return self._order(mission, lease.id, lease)
+        order = self._order(mission, lease.id, lease)
+        if (proposal := mission.request.get("proposal")) is None:
+            return order
+        # What its approver has not ticked does not move, whatever its tenant may.
+        ticked = proposal["approval"]["actuators"]
+        return order.model_copy(
+            update={"actuators": [name for name in order.actuators if name in ticked]}
+        )
 
     def attached(self, mission: Mission, to: HostFlight) -> FlightOrder:
         """The order of a mission that senses by the cameras of another one, in real time.
@@ -336,6 +349,17 @@ class FlightOrders:
 def robots_of(document: MissionDocument) -> list[str]:
     """Robots that a document navigates, in the order in which it names them."""
     return list(dict.fromkeys(entry.robot for entry in document.navigation))
+
+
+def actuators_of(document: MissionDocument) -> frozenset[str]:
+    """Actuators that a document moves, as `robot/actuator`."""
+    return frozenset(
+        f"{entry.robot}/{action.equipment}"
+        for entry in document.navigation
+        for waypoint in entry.waypoints
+        for action in waypoint.actions
+        if action.equipment
+    )
 
 
 def _require_known(kind: str, wanted: list[str], known: set[str]) -> None:

@@ -143,6 +143,8 @@ class Admission:
         role: Role,
         scope: Scope | None,
         look: Callable[[Principal], object],
+        *,
+        agents: bool = False,
     ) -> bool:
         """Whether the sender of a request that lasts still may have it; counts as no further one.
 
@@ -153,11 +155,12 @@ class Admission:
             role: Least role that it needs.
             scope: Scope that it needs; None for none.
             look: Raises RefusedError for who may not.
+            agents: Whether agents may, too.
         """
         token, address = bearer(connection.headers), address_of(connection.scope)
         try:
             connection.scope[_SENDER] = self._tokens.of(token, address)
-            look(self.require(connection, role, scope))
+            look(self.require(connection, role, scope, agents=agents))
         except RefusedError as error:
             return error.status not in _GONE
         except AeroDaaSError:
@@ -166,7 +169,12 @@ class Admission:
         return True
 
     def require(
-        self, connection: HTTPConnection, role: Role, scope: Scope | None = None
+        self,
+        connection: HTTPConnection,
+        role: Role,
+        scope: Scope | None = None,
+        *,
+        agents: bool = False,
     ) -> Principal:
         """The sender of a request.
 
@@ -174,13 +182,14 @@ class Admission:
             connection: The request.
             role: Least role that it needs.
             scope: Scope that it needs; None for none.
+            agents: Whether agents may, too; a route that does not say so refuses them.
 
         Raises:
             RefusedError: If the sender may not do this.
         """
         principal: Principal = connection.scope[_SENDER]
         with self.auditing(principal, connection):
-            require(principal, role, scope)
+            require(principal, role, scope, agents=agents)
         return principal
 
     @contextmanager

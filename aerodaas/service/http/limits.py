@@ -113,7 +113,7 @@ class RequestLimits:
 
     def body_bytes(self, path: str) -> int:
         """Bytes that the body of a request for `path` may have."""
-        if path == "/v1/missions":
+        if path in {"/v1/missions", "/v1/proposals"}:
             return self.submission_bytes
         if path.startswith("/v1/missions/"):
             return self.command_bytes

@@ -33,6 +33,8 @@ class WatchedVehicle(VehicleReport):
     """Why the vehicle itself would refuse to take off now."""
     health: tuple[HealthItem, ...] = ()
     """The list before take-off."""
+    wind: float | None = None
+    """m/s along the ground; None if it is not known."""
     examined: float | None = None
     """Unix seconds of that list."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
 import time
@@ -9,7 +10,8 @@ from collections.abc import Callable
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.loading import load_vehicle
-from aerodaas.errors import AeroDaaSError, failure_line
+from aerodaas.errors import AeroDaaSError, VehicleError, failure_line
+from aerodaas.messages.health import MeasuredVehicle
 from aerodaas.messages.vehicle import Vehicle, VehicleMode, VehicleState
 from aerodaas.mission.safety.checklist import Checklist
 from aerodaas.protocol.schemas import LinkState
@@ -121,6 +123,7 @@ class VehicleWatcher:
                 state, objections = vehicle.read(), vehicle.preflight()
                 # The list before take-off: of one in the air, it stays as it was then.
                 items = None if state.armed else checklist.examine(state)
+                wind = _wind(vehicle)
             except Exception as error:
                 if not armed:
                     raise
@@ -133,7 +136,7 @@ class VehicleWatcher:
             else:
                 self._see(state, objections, now)
                 if items is not None:
-                    self._update(health=tuple(items), examined=now)
+                    self._update(health=tuple(items), examined=now, wind=wind)
             if not state.armed and self._silence() > _ANEW_SECONDS:
                 return self._report.reason
             with self._lock:
@@ -178,3 +181,11 @@ class VehicleWatcher:
             told = (before.link, before.held) != (self._report.link, self._report.held)
         if told:
             self._changed()
+
+
+def _wind(vehicle: Vehicle) -> float | None:
+    """Wind along the ground that a vehicle tells of, m/s; None without."""
+    if isinstance(vehicle, MeasuredVehicle):
+        with contextlib.suppress(VehicleError):  # its own objections say what is missing
+            return vehicle.health().wind
+    return None

@@ -33,18 +33,18 @@ class FleetRoutes:
 
     def me(self, request: Request) -> AccountOut:
         """The account that asks."""
-        return self._fleet.account(self._admission.require(request, Role.VIEWER))
+        return self._fleet.account(self._admission.require(request, Role.VIEWER, agents=True))
 
     def fleet(self, request: Request) -> FleetOut:
         """The drones, and the environment that applications are built against."""
-        return self._fleet.seen_by(self._admission.require(request, Role.VIEWER))
+        return self._fleet.seen_by(self._admission.require(request, Role.VIEWER, agents=True))
 
     def scenery(self, request: Request) -> SceneryOut:
         """Scenery below the fleet on a map."""
-        self._admission.require(request, Role.VIEWER)
+        self._admission.require(request, Role.VIEWER, agents=True)
         return self._fleet.fleet_scenery()
 
     def preflight(self, robot: str, request: Request) -> HealthReport:
         """A drone's health before take-off, to whoever sees its charge and place."""
-        self._admission.require(request, Role.VIEWER)
+        self._admission.require(request, Role.VIEWER, agents=True)
         return self._fleet.preflight(robot)

@@ -56,12 +56,12 @@ class LeaseRoutes:
 
     def leases(self, request: Request) -> list[LeaseOut]:
         """Leases that go on, in the queue's order."""
-        principal = self._admission.require(request, Role.VIEWER)
+        principal = self._admission.require(request, Role.VIEWER, agents=True)
         return [lease_out(one) for one in self._leases.all_seen(principal)]
 
     def lease(self, lease: str, request: Request) -> LeaseOut:
         """One lease."""
-        principal = self._admission.require(request, Role.VIEWER)
+        principal = self._admission.require(request, Role.VIEWER, agents=True)
         return lease_out(self._leases.seen(principal, lease))
 
     def extend(self, lease: str, body: ExtensionIn, request: Request) -> LeaseOut:

@@ -52,7 +52,7 @@ class LiveRoutes:
         wanted = wanted_streams(streams, pictures, depth)
         scope = Scope.SENSE if wanted else None
         try:
-            principal = self._admission.require(socket, Role.VIEWER, scope)
+            principal = self._admission.require(socket, Role.VIEWER, scope, agents=True)
             await asyncio.to_thread(self._missions.mission, principal, mission)
             own = await asyncio.to_thread(self._missions.flies, principal, mission)
         except AeroDaaSError as error:
@@ -61,7 +61,11 @@ class LiveRoutes:
 
         def allowed() -> bool:
             return self._admission.stays(
-                socket, Role.VIEWER, scope, lambda who: self._missions.mission(who, mission)
+                socket,
+                Role.VIEWER,
+                scope,
+                lambda who: self._missions.mission(who, mission),
+                agents=True,
             )
 
         session = LiveSession(socket, self._missions, self._hub, mission)

@@ -10,12 +10,15 @@ from aerodaas.config.extensions import added
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
 from aerodaas.protocol.scenery import SceneryOut
-from aerodaas.protocol.schemas import CommandIn, MissionOut, NavigationIn, Role, Scope
+from aerodaas.protocol.schemas import CommandIn, CommandWord, MissionOut, NavigationIn, Role, Scope
 from aerodaas.service.backend import Missions, PilotCommand, ShownMissions
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
 
 __all__ = ["MissionRoutes", "PilotingRoutes", "extension_routers"]
+
+_STOPS: frozenset[CommandWord] = frozenset({"pause", "return-home", "land"})
+"""Commands after which a robot does less than before: agents may give them, too."""
 
 
 def extension_routers(missions: Missions, admission: Admission) -> list[APIRouter]:
@@ -46,15 +49,19 @@ class MissionRoutes:
 
     def missions(self, request: Request) -> list[MissionOut]:
         """All missions that the account may see, newest first."""
-        return self._missions.missions(self._admission.require(request, Role.VIEWER))
+        return self._missions.missions(self._admission.require(request, Role.VIEWER, agents=True))
 
     def mission(self, mission: str, request: Request) -> MissionOut:
         """One mission with its newest state; its own user counts as present."""
-        return self._missions.mission(self._admission.require(request, Role.VIEWER), mission)
+        return self._missions.mission(
+            self._admission.require(request, Role.VIEWER, agents=True), mission
+        )
 
     def scenery(self, mission: str, request: Request) -> SceneryOut:
         """Ground below a mission on the map."""
-        return self._missions.scenery(self._admission.require(request, Role.VIEWER), mission)
+        return self._missions.scenery(
+            self._admission.require(request, Role.VIEWER, agents=True), mission
+        )
 
 
 class PilotingRoutes:
@@ -78,8 +85,12 @@ class PilotingRoutes:
     def command(
         self, mission: str, body: CommandIn, request: Request, later: BackgroundTasks
     ) -> Answer:
-        """Give one of the mission's robots a command; answers what the drone said."""
-        return self._fly(mission, body, body.command, request, later)
+        """Give one of the mission's robots a command; answers what the drone said.
+
+        An agent may stop a robot, and nothing else.
+        """
+        agents = body.command in _STOPS
+        return self._fly(mission, body, body.command, request, later, agents=agents)
 
     def navigation(
         self, mission: str, body: NavigationIn, request: Request, later: BackgroundTasks
@@ -107,9 +118,11 @@ class PilotingRoutes:
         request: Request,
         later: BackgroundTasks,
         part: str = "",
+        *,
+        agents: bool = False,
     ) -> Answer:
         """Have a robot do what its pilot asks; audited as `action` on the robot, or its `part`."""
-        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY, agents=agents)
         with self._admission.auditing(principal, request):
             answer = self._missions.fly(principal, mission, body)
         target = f"{mission}/{body.robot}{part}"

@@ -67,4 +67,5 @@ class PlaybackRoutes:
         return Response(content, media_type="application/octet-stream")
 
     def _of(self, mission: str, request: Request) -> Player:
-        return self._player(self._admission.require(request, Role.VIEWER, Scope.SENSE), mission)
+        principal = self._admission.require(request, Role.VIEWER, Scope.SENSE, agents=True)
+        return self._player(principal, mission)

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Header, Request
 from fastapi.responses import FileResponse
 
+from aerodaas.protocol.proposals import ApprovalIn
 from aerodaas.protocol.schemas import GrantIn, MissionIn, MissionOut, Role, Scope, Word
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.errors import RefusedError
@@ -68,18 +69,21 @@ class SubmissionRoutes:
 
     def cancel(self, mission: str, request: Request) -> MissionOut:
         """Cancel a mission; drones in flight come home."""
-        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY, agents=True)
         with self._admission.auditing(principal, request):
             found = self._missions.cancel(principal, mission)
         self._audit.write(principal, "mission.cancel", mission, accepted=True, required=False)
         return found
 
-    def approve(self, mission: str, request: Request) -> MissionOut:
-        """Approve a mission that waits for an operator."""
+    def approve(
+        self, mission: str, request: Request, approval: ApprovalIn | None = None
+    ) -> MissionOut:
+        """Approve a mission that waits for an operator; of a proposal, exactly what was shown."""
         principal = self._admission.require(request, Role.OPERATOR)
         with self._admission.auditing(principal, request):
-            found = self._missions.approve(principal, mission)
-        self._audit.write(principal, "mission.approve", mission, accepted=True)
+            found = self._missions.approve(principal, mission, approval)
+        told = "" if approval is None else approval.hash
+        self._audit.write(principal, "mission.approve", mission, told, accepted=True)
         return found
 
     def grant(self, mission: str, tenant: Word, body: GrantIn, request: Request) -> MissionOut:
@@ -104,7 +108,7 @@ class SubmissionRoutes:
 
     def recording(self, mission: str, request: Request) -> FileResponse:
         """The flight's recording, an MCAP file, once it is over."""
-        principal = self._admission.require(request, Role.VIEWER, Scope.SENSE)
+        principal = self._admission.require(request, Role.VIEWER, Scope.SENSE, agents=True)
         path = self._missions.file(principal, mission, "recording")
         return FileResponse(path, media_type="application/octet-stream", filename=f"{mission}.mcap")
 
@@ -117,7 +121,7 @@ class SubmissionRoutes:
 
     def picture(self, mission: str, request: Request) -> FileResponse:
         """Picture of the rehearsed flight."""
-        principal = self._admission.require(request, Role.VIEWER)
+        principal = self._admission.require(request, Role.VIEWER, agents=True)
         return FileResponse(
             self._missions.file(principal, mission, "picture"), media_type="image/png"
         )
