@@ -18,6 +18,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import pytest
 
+from aerodaas.config.extensions import added
 from aerodaas.config.model import RobotConfig
 from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
 from aerodaas.drivers.mavlink.autopilots.px4 import PX4
@@ -124,8 +125,9 @@ class SteppedClock:
     def drive(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Take the driver's own clocks and threads away: links turn, and waits end, by this one."""
         monotonic = SimpleNamespace(monotonic=lambda: self.now, sleep=self._sleep, time=time.time)
+        brought = {kind.__module__.rpartition(".")[0] + "." for kind in added("mavlink_components")}
         for name, module in list(sys.modules.items()):
-            if name.startswith("aerodaas.drivers.mavlink.") and hasattr(module, "time"):
+            if name.startswith(("aerodaas.drivers.mavlink.", *brought)) and hasattr(module, "time"):
                 monkeypatch.setattr(module, "time", monotonic)
         clock = self
 

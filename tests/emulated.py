@@ -29,7 +29,6 @@ from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.geometry.frames import Vector
 from aerodaas.messages.mission import MissionState
-from aerodaas.messages.payload import PhotoOutcome
 from aerodaas.messages.vehicle import PositionSetpoint, Setpoint, VehicleMode, VehicleState
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, Start
@@ -250,31 +249,6 @@ class Stepped:
     ) -> FlownMission:
         """A mission to `stops` that was started; `payload` as a mission takes it."""
         return FlownMission(self, stops, options, payload)
-
-    def find_payload(self) -> None:
-        """Wait for the gimbal's first word, and the camera."""
-        vehicle = self.vehicle
-        self.wait(lambda: vehicle.gimbal and vehicle.photo_camera and vehicle.gimbal.attitude)
-
-    def take_photo(self, label: str = "wp1") -> int:
-        """Ask for a picture; its number."""
-        camera = self.vehicle.photo_camera
-        assert camera is not None
-        return camera.take_photo(label)
-
-    def photo_outcome(self, timeout: float = 15.0) -> PhotoOutcome:
-        """The outcome of the next picture."""
-        outcomes: list[PhotoOutcome] = []
-
-        def look() -> bool:
-            camera = self.vehicle.photo_camera
-            assert camera is not None
-            outcomes.extend(camera.outcomes())
-            return bool(outcomes)
-
-        self.wait(look, timeout)
-        (outcome,) = outcomes
-        return outcome
 
 
 Flight: TypeAlias = Callable[..., Stepped]

@@ -50,6 +50,7 @@ Hook = Literal[
     "report_sections",
     "routes",
     "safety_rules",
+    "simulated_equipment",
 ]
 """A field of `Extension` that names code which the core calls for every flight or server."""
 SettingsSection = Literal["environment", "robot", "limits", "mission", "preflight"]
@@ -144,7 +145,9 @@ class Extension:
     `robots[].limits.towing.rope`."""
     mavlink_components: tuple[str, ...] = ()
     """`module:Class` of each `drivers.mavlink.component.MavlinkComponent` of every MAVLink
-    vehicle: equipment beside its autopilot, by its own messages."""
+    vehicle: equipment by messages of its own, or a service of the autopilot."""
+    simulated_equipment: tuple[str, ...] = ()
+    """`module:Class` of each `simulation.equipment.SimulatedEquipment` of every simulated drone."""
     safety_rules: tuple[str, ...] = ()
     """`module:Class` of each `mission.safety.supervisor.SafetyRule` of every drone, made with the
     robot's limits."""

@@ -11,7 +11,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from aerodaas.cameras.settings import camera_settings
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.checked import checked
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
@@ -31,7 +30,7 @@ from aerodaas.simulation.actuators import SimulatedActuators
 from aerodaas.simulation.airframe import Airframe, Wind
 from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
 from aerodaas.simulation.dynamics import STEP, STEP_NS, Multirotor
-from aerodaas.simulation.payload import SimulatedGimbal, SimulatedPhotoCamera
+from aerodaas.simulation.equipment import simulated_equipment
 from aerodaas.simulation.sensors import SensorNoise, SimulatedRangefinder, Surface
 from aerodaas.simulation.world import World
 from aerodaas.terrain.ground import Ground
@@ -43,7 +42,7 @@ _EXACT = SensorNoise(0.0, "")
 
 
 class SimulatedVehicle:
-    """A quadrotor in the embedded simulator: `SteppedVehicle`, `PayloadVehicle`, `ActuatedVehicle`.
+    """A quadrotor in the embedded simulator: `SteppedVehicle`, `ActuatedVehicle`.
 
     Time moves only in `advance_to`, on a fixed grid, so that the trajectory depends on the seed
     and the commands alone, not on how the caller slices time. One thread at a time may use it.
@@ -87,33 +86,16 @@ class SimulatedVehicle:
         self._now = 0
         self._steps = 0
         self._connected = False
-        self._actuators = SimulatedActuators(robot.actuators, self._open_parachute)
-        self._camera: SimulatedPhotoCamera | None = None
-        self._gimbal: SimulatedGimbal | None = None
-        for sensor in robot.sensors:
-            if sensor.type == "camera" and environment.camera_driver(sensor) == "simulated":
-                settings = camera_settings(sensor)
-                self._camera = SimulatedPhotoCamera(settings)
-                if settings.gimbal is not None:
-                    self._gimbal = SimulatedGimbal(settings.gimbal, settings)
-                break
-
-    @property
-    def gimbal(self) -> SimulatedGimbal | None:
-        """The gimbal of its first camera; None if that is bolted to the body."""
-        return self._gimbal
-
-    @property
-    def photo_camera(self) -> SimulatedPhotoCamera | None:
-        """Its first camera; None without one."""
-        return self._camera
+        self._actuators = SimulatedActuators(robot.actuators, self._descend)
+        self.equipment = simulated_equipment(robot, environment, self._descend)
+        """What extensions bring."""
 
     @property
     def actuators(self) -> SimulatedActuators:
         """Actuators that the environment file names."""
         return self._actuators
 
-    def _open_parachute(self) -> None:
+    def _descend(self) -> None:
         """Come down where it is, whatever anybody asks."""
         if self._autopilot.flying:
             self._autopilot.land(VehicleMode.FAILSAFE)
@@ -146,10 +128,13 @@ class SimulatedVehicle:
                 f"{self._name}: simulated time cannot run backwards, "
                 f"from {self._now} to {stamp} ns; advance to later stamps only"
             )
-        if self._camera is not None and self._camera.waits and self._connected:
-            # A picture is of the next step of time, however long the caller's steps are.
+        awaiting = [one for one in self.equipment if one.awaits_state]
+        if awaiting and self._connected:
+            # However long the caller's steps are.
             self._advance_to(min(stamp, (self._steps + 1) * STEP_NS))
-            self._camera.expose(self.read())
+            state = self.read()
+            for one in awaiting:
+                one.on_state(state)
         self._advance_to(stamp)
 
     def _advance_to(self, stamp: int) -> None:
@@ -159,17 +144,15 @@ class SimulatedVehicle:
             step()
         self._steps = stamp // STEP_NS
         self._actuators.advance_to(stamp)
-        if self._gimbal is not None:
-            self._gimbal.advance_to(stamp)
-        if self._camera is not None:
-            self._camera.advance_to(stamp)
+        for one in self.equipment:
+            one.advance_to(stamp)
 
     def read(self) -> VehicleState:
         """Return the state at the time last advanced to."""
         self._require_connection()
         motion = self._rotor.motion((self._now - self._steps * STEP_NS) / NANOSECONDS)
         exact, finder = _EXACT.odometry(motion), self._rangefinder
-        return VehicleState(
+        state = VehicleState(
             self._now,
             self._noise.odometry(motion),
             self._autopilot.battery.state,
@@ -179,11 +162,12 @@ class SimulatedVehicle:
             exact,
             tuple(self._faults()),
             ended=self._autopilot.ended,
-            gimbal=None if self._gimbal is None else self._gimbal.attitude,
-            zoom=None if self._camera is None else self._camera.zoom,
             below=finder.below(motion, self._now) if finder is not None else None,
             actuators=dict(self._actuators.positions),
         )
+        for one in self.equipment:
+            state = one.complete(state)
+        return state
 
     def _faults(self) -> list[str]:
         faults = []

@@ -9,12 +9,12 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, field, replace
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import Protocol, TypeAlias, TypeVar, runtime_checkable
 
 from aerodaas.clock import Clock
 from aerodaas.geometry.frames import Vector
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
-from aerodaas.messages.payload import Gimbal, GimbalAttitude, PhotoCamera
+from aerodaas.messages.payload import GimbalAttitude
 from aerodaas.messages.serialization.json_types import Int64, Real
 from aerodaas.messages.serialization.records import UNSENT, fast_pickle
 
@@ -22,7 +22,6 @@ __all__ = [
     "Capabilities",
     "ClockedVehicle",
     "FlightEnd",
-    "PayloadVehicle",
     "PlayedVehicle",
     "PositionSetpoint",
     "SeaLevelVehicle",
@@ -33,7 +32,11 @@ __all__ = [
     "VehicleMode",
     "VehicleState",
     "VelocitySetpoint",
+    "equipment_of",
 ]
+
+
+T = TypeVar("T")
 
 
 class VehicleMode(str, enum.Enum):
@@ -255,24 +258,6 @@ class SeaLevelVehicle(Vehicle, Protocol):
 
 
 @runtime_checkable
-class PayloadVehicle(Vehicle, Protocol):
-    """A vehicle that may carry a gimbal and a camera for pictures.
-
-    Both may be found late and vanish in flight, so they are asked for each time.
-    """
-
-    @property
-    def gimbal(self) -> Gimbal | None:
-        """Its gimbal; None if there is none, none yet, or none any more."""
-        ...
-
-    @property
-    def photo_camera(self) -> PhotoCamera | None:
-        """Its camera; None if there is none, none yet, or none any more."""
-        ...
-
-
-@runtime_checkable
 class PlayedVehicle(SteppedVehicle, Protocol):
     """A recorded vehicle, which comes to an end."""
 
@@ -280,3 +265,16 @@ class PlayedVehicle(SteppedVehicle, Protocol):
     def finished(self) -> bool:
         """True at the end of the recording."""
         ...
+
+
+def equipment_of(vehicle: object, kind: type[T]) -> T | None:
+    """The vehicle's equipment of one kind, such as its payload or its actuators.
+
+    A driver lists what a vehicle carries in its attribute `equipment`; extensions use it. Ask once:
+    to ask a protocol about an object looks up all its members each time.
+
+    Args:
+        vehicle: A vehicle, with or without equipment.
+        kind: A class, or a protocol that is checked at run time.
+    """
+    return next((one for one in getattr(vehicle, "equipment", ()) if isinstance(one, kind)), None)

@@ -24,7 +24,7 @@ from aerodaas.messages.mission import (
     SetpointRecord,
 )
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
-from aerodaas.messages.payload import GimbalAttitude, Photo, PhotoFailure
+from aerodaas.messages.payload import GimbalAttitude, Photo
 from aerodaas.messages.readings import Alert, Readings
 from aerodaas.messages.serialization.schema import MessageError, json_of, message_of
 from aerodaas.messages.vehicle import (
@@ -39,7 +39,7 @@ from aerodaas.messages.waypoints import FollowedTarget, VelocityCommand, Waypoin
 
 MESSAGES = (
     *(Alert, Battery, BatteryOutlook, CameraModel, Decision, Detection, Detections),
-    *(FollowedTarget, GimbalAttitude, GpsFix, Header, MissionStatus, Odometry, Photo, PhotoFailure),
+    *(FollowedTarget, GimbalAttitude, GpsFix, Header, MissionStatus, Odometry, Photo),
     *(PositionSetpoint, Readings, SetpointRecord, Traffic, VehicleState, VelocityCommand),
     *(VelocitySetpoint, Vitals, Waypoint),
 )

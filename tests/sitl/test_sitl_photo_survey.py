@@ -43,7 +43,7 @@ def test_pictures_lie_where_they_were_asked_for(autopilot: Autopilot, speed: flo
     survey = AddNavigation(AeroNavigation(data=lines))
     with SitlFlight(autopilot.url, survey, cruise_speed=5.0, max_speed=8.0) as flight:
         flight.run(60.0, lambda: flight.mission.state is S.ENROUTE)
-        if flight.vehicle.photo_camera is None:
+        if not flight.vehicle.health().cameras:
             pytest.skip("this autopilot carries no camera")
         fix, here = flight.vehicle.read().gps, flight.vehicle.read().odometry.position
         assert fix is not None
@@ -78,7 +78,7 @@ def test_the_gimbal_keeps_looking_at_a_place(autopilot: Autopilot) -> None:
     ]
     with SitlFlight(autopilot.url, AddNavigation(AeroNavigation(data=stops))) as flight:
         flight.run(60.0, lambda: flight.mission.state is S.ENROUTE)
-        if flight.vehicle.gimbal is None or flight.vehicle.photo_camera is None:
+        if flight.vehicle.read().gimbal is None or not flight.vehicle.health().cameras:
             pytest.skip("this autopilot carries no gimbal and camera")
         flight.run(240.0)
         assert flight.mission.state is S.LANDED, flight.story

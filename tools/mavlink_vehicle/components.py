@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.drivers.mavlink.wire.senders import CAMERAS
+from aerodaas.extensions.payload.mavlink.components import CAMERAS
 from tools.mavlink_vehicle.firmware import Firmware
 from tools.mavlink_vehicle.payload import EmulatedPayload
 

@@ -69,11 +69,8 @@ def _print_vehicle(vehicle: MavlinkVehicle) -> None:
         gps = state.gps
         place = f"{gps.latitude:.6f}, {gps.longitude:.6f}"
         typer.echo(f"at {place}, {gps.satellites} satellites")
-    for camera, stream in vehicle.payload.streams():
-        typer.echo(f"video of {camera}: {stream}")
-    for told in vehicle.payload.cameras():
-        trouble = f"; {told.trouble}" if told.trouble else ""
-        typer.echo(f"{told.name}: {told}{trouble}")
+    for line in (line for component in vehicle.equipment for line in component.description()):
+        typer.echo(line)
     for reason in vehicle.preflight():
         typer.echo(f"would not take off: {reason}")
 

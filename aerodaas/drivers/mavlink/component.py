@@ -1,8 +1,9 @@
-"""Equipment of a vehicle beside its autopilot, for which extensions bring the messages."""
+"""Equipment of a MAVLink vehicle, and services of its autopilot, that extensions bring."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,6 +11,7 @@ from aerodaas.config.extensions import added
 from aerodaas.config.model import RobotConfig
 from aerodaas.drivers.mavlink.connecting import Connection
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
+from aerodaas.drivers.mavlink.state.phase import FlightPhase
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.messages.health import HealthReadings
@@ -29,18 +31,28 @@ class ComponentContext:
     settings: MavlinkSettings
     telemetry: Telemetry
     """Newest messages of the autopilot."""
+    phase: FlightPhase
+    """Flight mode of the autopilot, and the one that it was asked for."""
+    lock: AbstractContextManager[object]
+    """Held while the driver calls the component, which may be in another thread."""
+    now: Callable[[], int]
+    """Mission clock, nanoseconds."""
 
 
 class MavlinkComponent:
-    """A component of one vehicle (`Extension.mavlink_components`).
+    """A component of one vehicle (`Extension.mavlink_components`), one of its `equipment`.
 
-    Its messages do not count as a word of the autopilot: a transmitter that goes on talking does
-    not hide that the vehicle is silent. The link's thread calls the handlers and `step`, the loop's
-    thread the rest, under one lock. Seconds are monotonic.
+    The link's thread calls the handlers and `step`, the loop's thread the rest, under one lock.
+    Seconds are monotonic.
     """
 
     senders: ClassVar[frozenset[int]] = frozenset()
-    """Ids of the components of the vehicle, beside its autopilot, from which its messages come."""
+    """Ids of the components of the vehicle, beside its autopilot, from which its messages come.
+
+    Where there are any, these messages do not count as a word of the autopilot: a transmitter that
+    goes on talking does not hide that the vehicle is silent."""
+    component_ids: ClassVar[frozenset[int]] = frozenset()
+    """Ids of the components of the vehicle whose every message goes to `on_component_message`."""
 
     def __init__(self, context: ComponentContext) -> None:
         """Prepare for a vehicle that is not connected yet."""
@@ -52,6 +64,23 @@ class MavlinkComponent:
     def handlers(self) -> Mapping[str, MessageHandler]:
         """Handlers by the name of their message, of which no other component has any."""
         return {}
+
+    @property
+    def changes_mode(self) -> bool:
+        """Whether it has asked for a mode, in which setpoints do not matter, and awaits it."""
+        return False
+
+    def connect(self, connection: Connection) -> None:
+        """Serve a vehicle that is connected from now on."""
+        self.connection = connection
+
+    def on_component_message(self, message: Message, now: float) -> None:
+        """Process a message of a component with one of its `component_ids`.
+
+        Args:
+            message: The message.
+            now: Monotonic clock.
+        """
 
     def step(self, now: float) -> None:
         """Send what is due; called 20 times a second.
@@ -80,6 +109,17 @@ class MavlinkComponent:
         """
         del now
         return readings
+
+    def description(self) -> list[str]:
+        """Lines for somebody who looks at the vehicle before a flight."""
+        return []
+
+    def close(self, pause: Callable[[], None]) -> None:
+        """End what goes on, before the link is closed; called without the lock.
+
+        Args:
+            pause: Waits a little for the next message.
+        """
 
 
 def mavlink_components(context: ComponentContext) -> list[MavlinkComponent]:

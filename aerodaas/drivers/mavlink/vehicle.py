@@ -33,7 +33,6 @@ from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.mission_mode import MavlinkMissionMode
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
 from aerodaas.drivers.mavlink.one_link import check_links, link_of
-from aerodaas.drivers.mavlink.payload.payload import Payload
 from aerodaas.drivers.mavlink.settings import MavlinkSettings, mavlink_settings
 from aerodaas.drivers.mavlink.state.phase import PROTECTIVE, FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.state.reporting import REASONS, VehicleReport
@@ -46,7 +45,6 @@ from aerodaas.drivers.pin import Peer
 from aerodaas.drivers.setpoints import require_finite
 from aerodaas.errors import ConfigError, InvalidWaypointError, VehicleError
 from aerodaas.messages.health import HealthReadings
-from aerodaas.messages.payload import Gimbal, PhotoCamera
 from aerodaas.messages.vehicle import Capabilities, Setpoint, VehicleMode, VehicleState
 
 __all__ = ["MavlinkVehicle"]
@@ -58,7 +56,7 @@ _PARTING = 4.0
 
 
 class MavlinkVehicle:
-    """One multicopter with PX4 or ArduPilot; `ClockedVehicle`, `PayloadVehicle`, `ActuatedVehicle`.
+    """One multicopter with PX4 or ArduPilot; `ClockedVehicle`, `ActuatedVehicle`.
 
     One thread at a time may use it, except the link's own. Raises ConfigError for unknown settings.
     """
@@ -91,11 +89,17 @@ class MavlinkVehicle:
         self._phase = FlightPhase()
         self._watchdog = Watchdog()
         self._touchdown = Touchdown()
-        context = ComponentContext(self._robot, self._settings, self._telemetry)
-        self._components = mavlink_components(context)
-        self._report = VehicleReport(
-            self._telemetry, self._phase, self._touchdown, self._components
+        context = ComponentContext(
+            self._robot,
+            self._settings,
+            self._telemetry,
+            self._phase,
+            self._lock,
+            self._mission_time,
         )
+        self.equipment = mavlink_components(context)
+        """What extensions bring."""
+        self._report = VehicleReport(self._telemetry, self._phase, self._touchdown, self.equipment)
         self._steering = Steering(self._robot, self._settings)
         self._words: deque[str] = deque()
         self._finder = Finder(self._settings)
@@ -106,16 +110,12 @@ class MavlinkVehicle:
         self._modes: ModeChange | None = None
         self.mission_mode: MavlinkMissionMode | None = None
         """Its own mission mode; None before it is connected."""
-        self.payload = Payload(self._clock, self._lock)
-        """Gimbals and cameras that it carries."""
         self._actuators = MavlinkActuators(self._robot.actuators, self._settings, self._lock)
         self._completion = ClimbCompletion(self._telemetry, self._phase)
         self._checked_at = -math.inf
         self._told: VehicleMode | None = None
         self._component_handlers: dict[str, MessageHandler] = {}
         """Handlers of messages that are no word of the autopilot, by their name."""
-        for component in self._components:
-            self._component_handlers |= component.handlers
         self._handlers: dict[str, MessageHandler] = {
             "COMMAND_ACK": self._on_command_ack,
             "HEARTBEAT": self._on_heartbeat,
@@ -126,9 +126,14 @@ class MavlinkVehicle:
             **dict.fromkeys(
                 MavlinkActuators.messages, lambda message, _: self._actuators.on_message(message)
             ),
-            **dict.fromkeys(Payload.messages, self.payload.on_message),
         }
         """Handlers of the autopilot's messages by their name, after the telemetry."""
+        for component in self.equipment:
+            handlers = self._component_handlers if component.senders else self._handlers
+            handlers |= component.handlers
+
+    def _mission_time(self) -> int:
+        return self._clock.now()
 
     @property
     def capabilities(self) -> Capabilities:
@@ -143,7 +148,7 @@ class MavlinkVehicle:
 
     def use_clock(self, clock: Clock) -> None:
         """Stamp states by `clock` from now on; the calling thread is the control loop."""
-        self._clock = self.payload.clock = clock
+        self._clock = clock
         self._watchdog.belong()
 
     def connect(self, timeout: float = 10.0) -> None:
@@ -159,11 +164,12 @@ class MavlinkVehicle:
             self._settings,
             on_message=self._on_message,
             on_turn=self._turned,
-            on_component=self.payload.take_component,
+            on_component=self._on_component_message,
+            component_ids=frozenset().union(*(one.component_ids for one in self.equipment)),
             healthy=self._watchdog.healthy,
             stands=self._stands,
             messages=self._telemetry.messages | self._handlers.keys(),
-            equipment={name: one.senders for one in self._components for name in one.handlers},
+            equipment={name: one.senders for one in self.equipment for name in one.handlers},
         )
         link.open()
         self._link = link
@@ -211,9 +217,8 @@ class MavlinkVehicle:
             )
             self._report.alignment = self._connection.alignment
             self._connection.alignment.require_same_boot()
-            self.payload.search(commander)
-            for component in self._components:
-                component.connection = self._connection
+            for component in self.equipment:
+                component.connect(self._connection)
             self.mission_mode = MavlinkMissionMode(
                 self._robot,
                 self._settings,
@@ -246,7 +251,8 @@ class MavlinkVehicle:
             return
         if self._connection is not None:
             self._part(self._connection)
-            self.payload.part(self._name, self._pause)
+            for component in self.equipment:
+                component.close(self._pause)
             if self._settings.fallback == "set" and not self._settings.observe:
                 self._connection.put_back(self._name, stands=self._stands())
         link.close()
@@ -287,17 +293,7 @@ class MavlinkVehicle:
             link, now = self._connected().link, time.monotonic()
             state = self._report.state(self._clock.now(), now, link.counts, link.reports(now))
             state.actuators.update(self._actuators.positions)
-            return self.payload.complete(state)
-
-    @property
-    def gimbal(self) -> Gimbal | None:
-        """The gimbal that it carries, once it is found."""
-        return self.payload.gimbal
-
-    @property
-    def photo_camera(self) -> PhotoCamera | None:
-        """The camera that it carries, once it is found."""
-        return self.payload.camera
+            return state
 
     @property
     def actuators(self) -> MavlinkActuators:
@@ -315,8 +311,7 @@ class MavlinkVehicle:
         with self._lock:
             obstacles = self._connected().fallback.obstacles
             stranded = None if self._settings.fallback == "ignore" else obstacles
-            told = self._report.health(time.monotonic(), stranded)
-            return self.payload.complete_health(told)
+            return self._report.health(time.monotonic(), stranded)
 
     def preflight(self) -> list[str]:
         """Reasons against a take-off now; empty when ready."""
@@ -405,7 +400,8 @@ class MavlinkVehicle:
             waits=self._phase.shown is not FlightMode.GUIDED,
         )
         connection.link.send(message)
-        if self.mission_mode is None or not self.mission_mode.starts:
+        changes = any(component.changes_mode for component in self.equipment)
+        if not changes and (self.mission_mode is None or not self.mission_mode.starts):
             before = connection.autopilot.stream_before
             self._steering.see_to_guidance(self._phase, before, self._change, now)
         return sent
@@ -504,6 +500,13 @@ class MavlinkVehicle:
             if kind in self._handlers:
                 self._handlers[kind](message, now)
 
+    def _on_component_message(self, message: Message, now: float) -> None:
+        """Process a message of a component with an id of its own; in the link's thread."""
+        with self._lock:
+            for component in self.equipment:
+                if message.get_srcComponent() in component.component_ids:
+                    component.on_component_message(message, now)
+
     def _restarted(self) -> None:
         """Handle a restart of the autopilot; its first messages may have been processed."""
         self._touchdown.restart(self._telemetry.heard_at)
@@ -572,8 +575,7 @@ class MavlinkVehicle:
             self._commander.step(now)
             self._rates.step(self._telemetry, now)
             self._touchdown.update(now)
-            self.payload.step(now)
-            for component in self._components:
+            for component in self.equipment:
                 component.step(now)
             self._actuators.step(now)
             if self.mission_mode is not None:

@@ -1,4 +1,4 @@
-"""What a gimbal and a camera add to the core: actions of waypoints, and what performs them."""
+"""What a gimbal and a camera add to the core: both themselves, actions, and what performs them."""
 
 from aerodaas.config.extensions import Extension
 
@@ -7,6 +7,8 @@ EXTENSION = Extension(
     summary="Gimbal, pictures, video, zoom and focus in a mission.",
     settings={"mission": "aerodaas.extensions.payload.settings:PayloadMission"},
     recorded_settings=("robots[].mission.photo_timeout",),
+    mavlink_components=("aerodaas.extensions.payload.mavlink.component:MavlinkPayload",),
+    simulated_equipment=("aerodaas.extensions.payload.simulated:SimulatedPayload",),
     actions=(
         "aerodaas.extensions.payload.actions:TriggerPhotos",
         "aerodaas.extensions.payload.actions:LookAt",

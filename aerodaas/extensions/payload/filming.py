@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from aerodaas.clock import seconds
 from aerodaas.errors import VehicleError, failure_line
 from aerodaas.extensions.payload.actions import RecordVideo
-from aerodaas.messages.payload import VideoCamera
-from aerodaas.messages.vehicle import PayloadVehicle
+from aerodaas.extensions.payload.equipment import Payload, VideoCamera
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.navigation.queue import QueuedWaypoint
 
@@ -40,12 +39,12 @@ class _Order:
 class Filming:
     """Recordings of one mission; `Photographer` calls it."""
 
-    def __init__(self, vehicle: PayloadVehicle | None, log: MissionLog, timeout: float) -> None:
-        """Use the camera of `vehicle`, if it has one that is a `VideoCamera`.
+    def __init__(self, payload: Payload | None, log: MissionLog, timeout: float) -> None:
+        """Use the camera of `payload`, if it has one that is a `VideoCamera`.
 
         `timeout` in seconds is what it gets to acknowledge; alerts go to `log`.
         """
-        self._vehicle = vehicle
+        self._payload = payload
         self._log = log
         self._timeout = timeout
         self._served: dict[str, QueuedWaypoint] = {}
@@ -127,7 +126,7 @@ class Filming:
             self._fail(order, failure_line(error), now)
 
     def _camera(self) -> VideoCamera:
-        camera = None if self._vehicle is None else self._vehicle.photo_camera
+        camera = None if self._payload is None else self._payload.photo_camera
         if camera is None:
             raise VehicleError("the vehicle has no camera, or none that answers")
         if not isinstance(camera, VideoCamera):

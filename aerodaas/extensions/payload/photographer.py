@@ -18,22 +18,23 @@ from aerodaas.config.checked import added_settings
 from aerodaas.config.sections.robot import RobotConfig
 from aerodaas.errors import VehicleError, failure_line
 from aerodaas.extensions.payload.actions import AimGimbal, LookAt, SetLens, TakePhoto, TriggerPhotos
+from aerodaas.extensions.payload.equipment import (
+    Gimbal,
+    GimbalTarget,
+    LensCamera,
+    LensTarget,
+    Payload,
+    PhotoCamera,
+    PhotoOutcome,
+)
 from aerodaas.extensions.payload.filming import Filming
 from aerodaas.extensions.payload.photo_trigger import PhotoTrigger
 from aerodaas.extensions.payload.point_of_interest import PointOfInterest, fresh, near
 from aerodaas.extensions.payload.settings import PayloadMission
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.payload import (
-    Gimbal,
-    GimbalTarget,
-    LensCamera,
-    LensTarget,
-    Photo,
-    PhotoCamera,
-    PhotoOutcome,
-)
-from aerodaas.messages.vehicle import PayloadVehicle
+from aerodaas.messages.payload import Photo
+from aerodaas.messages.vehicle import equipment_of
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.action_executor import ActionExecutor, Course
 from aerodaas.mission.log import MissionLog, words
@@ -66,12 +67,12 @@ class PhotoRequest:
 class PhotoCapture:
     """The camera of a vehicle; raises nothing but what `take` says."""
 
-    def __init__(self, vehicle: PayloadVehicle | None, log: MissionLog, timeout: float) -> None:
-        """Use `vehicle`'s camera; a picture is awaited for `timeout` seconds.
+    def __init__(self, payload: Payload | None, log: MissionLog, timeout: float) -> None:
+        """Use the camera of `payload`; a picture is awaited for `timeout` seconds.
 
         `log` gets pictures and alerts.
         """
-        self._vehicle = vehicle
+        self._payload = payload
         self._log = log
         self._timeout = timeout
         self._awaited: dict[int, PhotoRequest] = {}
@@ -82,7 +83,7 @@ class PhotoCapture:
     @property
     def camera(self) -> PhotoCamera | None:
         """The camera; None without one that answers."""
-        return None if self._vehicle is None else self._vehicle.photo_camera
+        return None if self._payload is None else self._payload.photo_camera
 
     @property
     def busy(self) -> bool:
@@ -218,15 +219,16 @@ class Photographer(ActionExecutor):
     order: ClassVar[int] = 1
 
     def __init__(self, vehicle: object, robot: RobotConfig, log: MissionLog) -> None:
-        """Use gimbal and camera of `vehicle`, if it has any (see `PayloadVehicle`).
+        """Use the `Payload` among the equipment of `vehicle`, if there is one.
 
-        Both get the `photo_timeout` of `robot` at a waypoint, together; alerts go to `log`.
+        Gimbal and camera get the `photo_timeout` of `robot` at a waypoint, together; alerts go to
+        `log`.
         """
-        self._vehicle = vehicle if isinstance(vehicle, PayloadVehicle) else None
+        self._payload = equipment_of(vehicle, Payload)
         self._log = log
         self._timeout = timeout = added_settings(robot.mission, PayloadMission).photo_timeout
-        self._shutter = PhotoCapture(self._vehicle, log, timeout)
-        self._filming = Filming(self._vehicle, log, timeout)
+        self._shutter = PhotoCapture(self._payload, log, timeout)
+        self._filming = Filming(self._payload, log, timeout)
         self._point_of_interest = PointOfInterest()
         self._tasks: dict[str, _Task] = {}
         """By waypoint, so that a stop that was interrupted goes on where it was."""
@@ -441,4 +443,4 @@ class Photographer(ActionExecutor):
             self._log.alert(now, "photo", f"{task.stop.id}: {what}: {reason}")
 
     def _gimbal(self) -> Gimbal | None:
-        return None if self._vehicle is None else self._vehicle.gimbal
+        return None if self._payload is None else self._payload.gimbal

@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 
 from aerodaas.clock import NANOSECONDS
+from aerodaas.extensions.payload.equipment import Gimbal, GimbalTarget
 from aerodaas.geometry.frames import Vector, wrap_angle
 from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.payload import Gimbal, GimbalAttitude, GimbalTarget
+from aerodaas.messages.payload import GimbalAttitude
 
 __all__ = ["AIMED", "PointOfInterest", "direction_to", "fresh", "near"]
 

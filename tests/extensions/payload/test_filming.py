@@ -13,8 +13,9 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.errors import VehicleError
+from aerodaas.extensions.payload.equipment import Payload, PhotoOutcome, VideoCamera
 from aerodaas.messages.mission import MissionState
-from aerodaas.messages.payload import PhotoOutcome, VideoCamera
+from aerodaas.messages.vehicle import equipment_of
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, End, Start
 from aerodaas.mission.loop import SetpointLoop
@@ -301,7 +302,9 @@ def test_a_simulated_camera_records_between_its_waypoints() -> None:
     environment = EnvironmentConfig.model_validate({"robots": [robot]})
     vehicle = SimulatedVehicle(robot, environment)
     vehicle.connect()
-    camera = vehicle.photo_camera
+    payload = equipment_of(vehicle, Payload)
+    assert payload is not None
+    camera = payload.photo_camera
     assert isinstance(camera, VideoCamera)
     start = vehicle.read().odometry.position
     mission = Mission(robot, InlinePlanner(OrderedScheduler()), takeoff=start, payload=vehicle)

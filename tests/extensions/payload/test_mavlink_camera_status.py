@@ -9,16 +9,17 @@ import pytest
 from emulated import Stepped, told
 from hypothesis import given
 from hypothesis import strategies as st
-from surveyors import patience
+from surveyors import find_payload, patience, payload_of, photo_outcome, take_photo
 
 from aerodaas.clock import NANOSECONDS, SimulatedClock
 from aerodaas.config.model import LimitsConfig
 from aerodaas.config.sections.preflight import PreflightConfig
-from aerodaas.drivers.mavlink.payload.camera_status import with_capture, with_model
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
+from aerodaas.extensions.payload.equipment import LensCamera, LensTarget, PhotoFailure
+from aerodaas.extensions.payload.mavlink.camera_status import with_capture, with_model
 from aerodaas.messages.health import HealthItem, Verdict
-from aerodaas.messages.payload import CameraStatus, LensCamera, LensTarget, Photo, PhotoFailure
+from aerodaas.messages.payload import CameraStatus, Photo
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.safety.checklist import Checklist
 from tools.mavlink_vehicle import AutopilotOptions
@@ -40,8 +41,8 @@ def payload(ends: Stepped) -> EmulatedPayload:
 
 def ready(ends: Stepped) -> None:
     """Wait until the camera has told how many pictures it took."""
-    ends.find_payload()
-    ends.wait(lambda: [one.taken for one in ends.vehicle.payload.cameras()] != [None])
+    find_payload(ends)
+    ends.wait(lambda: [one.taken for one in payload_of(ends.vehicle).cameras()] != [None])
 
 
 def camera_item(ends: Stepped, **policy: str) -> HealthItem | None:
@@ -58,7 +59,7 @@ def test_a_camera_tells_what_it_is_and_does(ends: Stepped) -> None:
         payload(ends).free = 12_000.0
         ready(ends)
         ends.watch(3.0)
-        (status,) = ends.vehicle.payload.cameras()
+        (status,) = payload_of(ends.vehicle).cameras()
         view = math.degrees(2 * math.atan(13.2 / 2 / 8.8))
         assert status.view == pytest.approx(view, abs=1e-3)
         assert replace(status, view=None) == CameraStatus(
@@ -85,8 +86,8 @@ def test_a_camera_that_knows_the_former_requests_alone(ends: Stepped) -> None:
         camera.former = True
         payload(ends).free, payload(ends).video = 12_000.0, "rtsp://127.0.0.1/main"
         ready(ends)
-        ends.wait(lambda: ends.vehicle.payload.cameras()[0].free == 12_000.0)
-        ends.wait(ends.vehicle.payload.streams)
+        ends.wait(lambda: payload_of(ends.vehicle).cameras()[0].free == 12_000.0)
+        ends.wait(payload_of(ends.vehicle).streams)
         wanted = [one.command for one in camera.heard if one.get_type() == "COMMAND_LONG"]
         ends.watch(8.0)
         newer = [one.command for one in camera.heard if one.get_type() == "COMMAND_LONG"]
@@ -101,14 +102,14 @@ def test_a_picture_whose_message_is_lost_is_taken_by_the_count(ends: Stepped) ->
     with ends:
         ready(ends)
         clock = SimulatedClock()
-        ends.vehicle.payload.clock = clock
+        ends.vehicle.use_clock(clock)
         payload(ends).mute = True
         asked = ends.now
-        number = ends.take_photo()
+        number = take_photo(ends)
         # Time and place are those of the camera's word, not of its count.
         ends.wait(lambda: payload(ends).taken)
         clock.advance_to(NANOSECONDS)
-        photo = ends.photo_outcome(6.0)
+        photo = photo_outcome(ends, 6.0)
         assert isinstance(photo, Photo)
         assert photo.stamp == 0
         assert (photo.number, photo.label, photo.place, photo.file) == (number, "wp1", None, "")
@@ -117,11 +118,11 @@ def test_a_picture_whose_message_is_lost_is_taken_by_the_count(ends: Stepped) ->
         assert ends.now - asked < 4.0
         # The next one is told as ever, with its own name.
         payload(ends).mute = False
-        second = ends.take_photo()
-        photo = ends.photo_outcome()
+        second = take_photo(ends)
+        photo = photo_outcome(ends)
         assert isinstance(photo, Photo)
         assert (photo.number, photo.file) == (second, "DCIM/0002.JPG")
-        (status,) = ends.vehicle.payload.cameras()
+        (status,) = payload_of(ends.vehicle).cameras()
         assert status.taken == 1
 
 
@@ -141,12 +142,12 @@ def _busy(camera: EmulatedPayload) -> None:
 def test_a_picture_that_nothing_tells_of_is_lost(ends: Stepped, strike: object) -> None:
     """Not taken; no count; or the camera takes others by itself, and whose is it then."""
     with ends:
-        ends.find_payload()
+        find_payload(ends)
         assert callable(strike)
         strike(payload(ends))
         ends.watch(12.0)
-        number = ends.take_photo()
-        failure = ends.photo_outcome(10.0)
+        number = take_photo(ends)
+        failure = photo_outcome(ends, 10.0)
         assert failure == PhotoFailure(number, "the camera does not tell of the picture")
 
 
@@ -194,7 +195,7 @@ ABLE = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE | mavlink.CAMERA_CAP_FLAGS_HAS_BAS
 
 def lens_of(ends: Stepped) -> LensCamera:
     """The camera, whose lens can be set."""
-    camera = ends.vehicle.photo_camera
+    camera = payload_of(ends.vehicle).photo_camera
     assert isinstance(camera, LensCamera)
     return camera
 
@@ -203,7 +204,7 @@ def test_zoom_and_focus_are_set_in_percent(ends: Stepped) -> None:
     """Acknowledged before it counts; what the camera says that it has not is refused at once."""
     with ends:
         payload(ends).flags = ABLE | mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_FOCUS
-        ends.find_payload()
+        find_payload(ends)
         camera = lens_of(ends)
         camera.adjust(LensTarget(40.0, 100.0))
         assert not camera.adjusted
@@ -223,7 +224,7 @@ def test_a_lens_without_zoom_or_focus_is_told(ends: Stepped) -> None:
     """By the flags of its CAMERA_INFORMATION; the drone flies on."""
     with ends:
         payload(ends).flags = ABLE
-        ends.find_payload()
+        find_payload(ends)
         with pytest.raises(VehicleError, match="focus of the camera cannot be set"):
             lens_of(ends).adjust(LensTarget(focus=3.0))
         stop = Waypoint("a", 3, 0, 2, zoom=30.0, focus=5.0, photo=True)

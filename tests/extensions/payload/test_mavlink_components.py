@@ -7,11 +7,12 @@ from collections.abc import Callable
 
 import pytest
 from emulated import Stepped, told
-from surveyors import fly_pictures
+from surveyors import find_payload, fly_pictures, payload_of, photo_outcome, take_photo
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.extensions.payload.equipment import GimbalTarget, PhotoFailure
 from aerodaas.messages.mission import MissionState
-from aerodaas.messages.payload import GimbalTarget, Photo, PhotoFailure
+from aerodaas.messages.payload import Photo
 from aerodaas.mission.mission import Mission
 from tools.mavlink_vehicle import AutopilotOptions
 
@@ -38,8 +39,8 @@ def commands(ends: Stepped, component: int, number: int) -> int:
 def test_they_are_found_by_their_heartbeats_and_commanded_by_their_ids(ends: Stepped) -> None:
     """Pictures by the camera, angles by the gimbal; the autopilot gets none of it."""
     with ends:
-        ends.find_payload()
-        gimbal = ends.vehicle.gimbal
+        find_payload(ends)
+        gimbal = payload_of(ends.vehicle).gimbal
         assert gimbal is not None
         gimbal.aim(GimbalTarget(-0.8, 0.5))
         ends.watch(3.0)
@@ -48,8 +49,8 @@ def test_they_are_found_by_their_heartbeats_and_commanded_by_their_ids(ends: Ste
         seen = ends.vehicle.read().gimbal
         assert seen is not None
         assert (seen.pitch, seen.yaw) == pytest.approx((-0.8, 0.5))
-        ends.take_photo()
-        photo = ends.photo_outcome()
+        take_photo(ends)
+        photo = photo_outcome(ends)
         assert isinstance(photo, Photo)
         assert photo.gimbal is not None
         assert photo.file == "DCIM/0001.JPG"
@@ -102,21 +103,21 @@ def test_what_fails_in_flight_costs_the_second_picture_alone(
 def test_one_that_vanishes_is_told_and_found_again(ends: Stepped) -> None:
     """A picture that is awaited is given up; with its next heartbeat it is back."""
     with ends:
-        ends.find_payload()
-        number = ends.take_photo()
+        find_payload(ends)
+        number = take_photo(ends)
         ends.autopilot.components[CAMERA].vanished = True
-        failure = ends.photo_outcome(7.0)
+        failure = photo_outcome(ends, 7.0)
         assert isinstance(failure, PhotoFailure)
         assert failure.number == number
         assert "says nothing any more" in failure.reason
-        assert ends.vehicle.photo_camera is None
+        assert payload_of(ends.vehicle).photo_camera is None
         faults = ends.vehicle.read().faults
         assert faults == ("camera (component 100): no word from it any more",)
         ends.autopilot.components[CAMERA].vanished = False
         ends.watch(2.0)
         assert ends.vehicle.read().faults == ()
-        assert ends.take_photo() > number
-        assert isinstance(ends.photo_outcome(), Photo)
+        assert take_photo(ends) > number
+        assert isinstance(photo_outcome(ends), Photo)
 
 
 def test_the_camera_with_the_lowest_id_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -127,10 +128,10 @@ def test_the_camera_with_the_lowest_id_is_used(monkeypatch: pytest.MonkeyPatch) 
         capture = mavlink.MAV_CMD_IMAGE_START_CAPTURE
         numbers = []
         for component in (101, 103, 1):
-            numbers.append(ends.take_photo())
+            numbers.append(take_photo(ends))
             ends.watch(1.0)
             assert commands(ends, component, capture) == 1
-            photo = ends.photo_outcome()
+            photo = photo_outcome(ends)
             assert isinstance(photo, Photo)
             assert photo.number == numbers[-1]
             if component != 1:
@@ -150,7 +151,7 @@ def test_a_managed_gimbals_device_speaks_for_itself(monkeypatch: pytest.MonkeyPa
         managed.has_gimbal = False
         device.stuck = True
         ends.watch(6.0)
-        gimbal = ends.vehicle.gimbal
+        gimbal = payload_of(ends.vehicle).gimbal
         assert gimbal is not None
         assert gimbal.attitude is not None
         assert gimbal.attitude.pitch == pytest.approx(-0.4)
@@ -181,7 +182,7 @@ def test_strangers_are_no_components(
                 else:
                     ends.autopilot.inject(content)
                 ends.turn()
-        assert ends.vehicle.photo_camera is None
+        assert payload_of(ends.vehicle).photo_camera is None
         assert not any(
             message.get_type() == "COMMAND_LONG" and message.target_component == CAMERA
             for _, message in ends.autopilot.heard
@@ -203,11 +204,11 @@ def test_the_address_of_the_video_is_found(monkeypatch: pytest.MonkeyPatch, comp
         state = ends.vehicle.read()
         assert state.video == "rtsp://me:secret@10.0.0.9:8554/main"
         assert "secret" not in repr(state)
-        ((name, stream),) = ends.vehicle.payload.streams()
+        ((name, stream),) = payload_of(ends.vehicle).streams()
         assert str(stream) == "rtsp://10.0.0.9:8554/main (main), 1920x1080, 30/s"
         assert name == ("the autopilot's camera" if component == 1 else "camera (component 100)")
-        ends.take_photo()
-        assert isinstance(ends.photo_outcome(), Photo)
+        take_photo(ends)
+        assert isinstance(photo_outcome(ends), Photo)
         payload.video = "rtsp://10.6.6.6/other"
         ends.watch(8.0)
         assert ends.vehicle.read().video == state.video

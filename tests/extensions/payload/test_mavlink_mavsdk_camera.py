@@ -13,10 +13,12 @@ from autopilot import robot_of
 from emulated import LOOPBACK, free_port, wait_for
 from required import needs_peer, peer
 from router import Router
+from surveyors import payload_of
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.messages.payload import LensCamera, LensTarget, Photo, PhotoOutcome, PhotoPlace
+from aerodaas.extensions.payload.equipment import LensCamera, LensTarget, PhotoOutcome
+from aerodaas.messages.payload import Photo, PhotoPlace
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 PYTHON = peer("AERODAAS_MAVSDK")
@@ -50,8 +52,9 @@ def test_its_pictures_its_lens_and_its_card() -> None:
         vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
         opened.callback(vehicle.close)
         vehicle.connect(20.0)
-        wait_for(lambda: bool(vehicle.payload.cameras()) and vehicle.photo_camera is not None)
-        used = vehicle.photo_camera
+        payload = payload_of(vehicle)
+        wait_for(lambda: bool(payload.cameras()) and payload.photo_camera is not None)
+        used = payload.photo_camera
         assert isinstance(used, LensCamera)
         number = used.take_photo("gate")
         said: list[PhotoOutcome] = []
@@ -63,8 +66,8 @@ def test_its_pictures_its_lens_and_its_card() -> None:
         wait_for(look)
         used.adjust(LensTarget(zoom=40.0, focus=60.0))
         wait_for(lambda: used.adjusted)
-        wait_for(lambda: vehicle.payload.cameras()[0].free is not None)
-        (told,) = vehicle.payload.cameras()
+        wait_for(lambda: payload.cameras()[0].free is not None)
+        (told,) = payload.cameras()
         did, _ = camera.communicate(timeout=10.0)
     (photo,) = said
     assert isinstance(photo, Photo)

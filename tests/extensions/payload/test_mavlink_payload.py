@@ -8,13 +8,14 @@ import pytest
 from emulated import Stepped, told
 from hypothesis import given
 from hypothesis import strategies as st
-from surveyors import fly_pictures
+from surveyors import find_payload, fly_pictures, payload_of, photo_outcome, take_photo
 
 from aerodaas.drivers.mavlink.microservices.commander import Commander
-from aerodaas.drivers.mavlink.payload.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.extensions.payload.equipment import GimbalTarget, PhotoFailure
+from aerodaas.extensions.payload.mavlink.gimbal import MavlinkGimbal
 from aerodaas.messages.mission import MissionState
-from aerodaas.messages.payload import GimbalTarget, Photo, PhotoFailure
+from aerodaas.messages.payload import Photo
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.payload import EmulatedPayload
 
@@ -35,8 +36,8 @@ def carried(ends: Stepped) -> EmulatedPayload:
 def test_down_and_left_are_down_and_left(ends: Stepped) -> None:
     """Ours are counted upwards and to the left; MAVLink's upwards and to the right."""
     with ends:
-        ends.find_payload()
-        gimbal = ends.vehicle.gimbal
+        find_payload(ends)
+        gimbal = payload_of(ends.vehicle).gimbal
         assert gimbal is not None
         assert gimbal.aim(GimbalTarget(-0.8, 0.5)) == GimbalTarget(-0.8, 0.5)
         ends.watch(3.0)
@@ -54,8 +55,8 @@ def test_down_and_left_are_down_and_left(ends: Stepped) -> None:
 def test_a_target_is_clipped_to_what_the_gimbal_told(ends: Stepped) -> None:
     """Its range is in GIMBAL_MANAGER_INFORMATION: 90 degrees down, 20 up, 170 to either side."""
     with ends:
-        ends.find_payload()
-        gimbal = ends.vehicle.gimbal
+        find_payload(ends)
+        gimbal = payload_of(ends.vehicle).gimbal
         assert gimbal is not None
         clipped = gimbal.aim(GimbalTarget(1.0, -3.1))
         assert clipped.pitch == pytest.approx(math.radians(20))
@@ -65,9 +66,9 @@ def test_a_target_is_clipped_to_what_the_gimbal_told(ends: Stepped) -> None:
 def test_a_picture_has_the_autopilots_place(ends: Stepped) -> None:
     """Above the sea, with number and label of the request."""
     with ends:
-        ends.find_payload()
-        number = ends.take_photo()
-        photo = ends.photo_outcome()
+        find_payload(ends)
+        number = take_photo(ends)
+        photo = photo_outcome(ends)
         assert isinstance(photo, Photo)
         assert (photo.number, photo.label) == (number, "wp1")
         assert photo.place is not None
@@ -78,8 +79,8 @@ def test_a_picture_has_the_autopilots_place(ends: Stepped) -> None:
         assert photo.odometry is not None
         assert photo.gimbal is not None
         assert photo.file in {"DCIM/0001.JPG", "picture 1"}
-        assert ends.take_photo() == number + 1
-        assert isinstance(ends.photo_outcome(), Photo)
+        assert take_photo(ends) == number + 1
+        assert isinstance(photo_outcome(ends), Photo)
         assert len(carried(ends).taken) == 2
 
 
@@ -90,23 +91,23 @@ def test_a_picture_has_the_autopilots_place(ends: Stepped) -> None:
 def test_a_picture_that_fails_is_told(ends: Stepped, fault: str, said: str) -> None:
     """At once where it is refused, after some seconds where nothing comes."""
     with ends:
-        ends.find_payload()
+        find_payload(ends)
         setattr(carried(ends), fault, True)
-        number = ends.take_photo()
-        failure = ends.photo_outcome()
+        number = take_photo(ends)
+        failure = photo_outcome(ends)
         assert isinstance(failure, PhotoFailure)
         assert failure.number == number
         assert said in failure.reason
         setattr(carried(ends), fault, False)
-        ends.take_photo()
-        assert isinstance(ends.photo_outcome(), Photo)
+        take_photo(ends)
+        assert isinstance(photo_outcome(ends), Photo)
 
 
 def test_a_gimbal_that_refuses_says_so(ends: Stepped) -> None:
     """The result of the command, in words."""
     with ends:
-        ends.find_payload()
-        gimbal = ends.vehicle.gimbal
+        find_payload(ends)
+        gimbal = payload_of(ends.vehicle).gimbal
         assert gimbal is not None
         carried(ends).gimbal_refuses = True
         gimbal.aim(GimbalTarget(-1.0, 0.0))
@@ -121,17 +122,17 @@ def test_a_gimbal_that_refuses_says_so(ends: Stepped) -> None:
 def test_an_attitude_that_is_none_is_no_word(ends: Stepped) -> None:
     """The last one ages, and in the end the gimbal counts as gone; it may come back."""
     with ends:
-        ends.find_payload()
+        find_payload(ends)
         carried(ends).nonsense = True
         ends.watch(1.0)
         state = ends.turn()
         assert state.gimbal is not None
         assert math.isfinite(state.gimbal.pitch)
         ends.watch(5.0)
-        assert ends.vehicle.gimbal is None
+        assert payload_of(ends.vehicle).gimbal is None
         carried(ends).nonsense = False
         ends.watch(1.0)
-        assert ends.vehicle.gimbal is not None
+        assert payload_of(ends.vehicle).gimbal is not None
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -139,8 +140,8 @@ def test_a_vehicle_without_them_is_left_alone(monkeypatch: pytest.MonkeyPatch, f
     """It is asked once for each, refuses, and is not asked again."""
     with Stepped(monkeypatch, AutopilotOptions(family=family)) as ends:  # type: ignore[arg-type]
         ends.watch(12.0)
-        assert ends.vehicle.gimbal is None
-        assert ends.vehicle.photo_camera is None
+        assert payload_of(ends.vehicle).gimbal is None
+        assert payload_of(ends.vehicle).photo_camera is None
         asked = [
             message.param1
             for _, message in ends.autopilot.heard
@@ -215,8 +216,8 @@ def test_a_mission_takes_its_pictures(ends: Stepped) -> None:
 def test_a_gimbal_that_tracks_is_not_commanded_each_time(ends: Stepped) -> None:
     """Targets that follow one another go as messages, with a command now and then."""
     with ends:
-        ends.find_payload()
-        gimbal = ends.vehicle.gimbal
+        find_payload(ends)
+        gimbal = payload_of(ends.vehicle).gimbal
         assert gimbal is not None
         for step in range(60):
             gimbal.aim(GimbalTarget(-0.5 - step / 200, step / 100))

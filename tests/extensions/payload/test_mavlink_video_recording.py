@@ -6,11 +6,11 @@ import logging
 
 import pytest
 from emulated import Stepped, told
-from surveyors import patience
+from surveyors import find_payload, patience, payload_of
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
-from aerodaas.messages.payload import VideoCamera
+from aerodaas.extensions.payload.equipment import VideoCamera
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.mission import Mission
 from tools.mavlink_vehicle import AutopilotOptions
@@ -44,14 +44,14 @@ def payload(ends: Stepped, number: int = CAMERA) -> EmulatedPayload:
 
 def camera_of(ends: Stepped) -> VideoCamera:
     """The camera."""
-    camera = ends.vehicle.photo_camera
+    camera = payload_of(ends.vehicle).photo_camera
     assert isinstance(camera, VideoCamera)
     return camera
 
 
 def known(ends: Stepped) -> VideoCamera:
     """The camera, once it has said whether it records."""
-    ends.find_payload()
+    find_payload(ends)
     ends.wait(lambda: camera_of(ends).filming is not None)
     return camera_of(ends)
 
@@ -85,7 +85,7 @@ def test_a_video_is_begun_and_ended_at_waypoints(ends: Stepped) -> None:
     recorded: list[float | None] = []
 
     def note(_: Mission) -> None:
-        recorded.append(next(iter(ends.vehicle.payload.cameras())).recording)
+        recorded.append(next(iter(payload_of(ends.vehicle).cameras())).recording)
 
     with ends:
         known(ends)
@@ -125,7 +125,7 @@ def test_a_camera_without_video_is_told_at_once(ends: Stepped) -> None:
     """By the flags of its CAMERA_INFORMATION; one without any flags may have it."""
     with ends:
         payload(ends).flags = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
-        ends.find_payload()
+        find_payload(ends)
         mission = ends.mission([BEGIN], OPTIONS, ends.vehicle).fly()
         assert list(mission.status.visited) == ["a"]
         assert told(mission, "video") == ["video not begun at a: the camera records no video"]

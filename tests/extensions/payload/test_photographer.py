@@ -9,8 +9,8 @@ from flights import Flight, KinematicVehicle, add, flight
 from surveyors import Surveyor, lost, patience
 
 from aerodaas.errors import VehicleError
+from aerodaas.extensions.payload.equipment import GimbalTarget, LensTarget
 from aerodaas.messages.mission import MissionState
-from aerodaas.messages.payload import GimbalTarget, LensTarget
 from aerodaas.messages.waypoints import Waypoint
 
 DOWN = -math.pi / 2

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from surveyors import Gimbal, Surveyor, lost, patience, simulated
 
 from aerodaas.clock import NANOSECONDS
+from aerodaas.extensions.payload.equipment import GimbalTarget
 from aerodaas.extensions.payload.point_of_interest import PointOfInterest, direction_to
 from aerodaas.geometry.frames import rotation_from_rpy, wrap_angle
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.payload import GimbalTarget
 from aerodaas.messages.vehicle import PositionSetpoint
 from aerodaas.messages.waypoints import Waypoint
 

@@ -79,7 +79,7 @@ class MavlinkLink:
     """Link to one vehicle; `send` may be called from any thread.
 
     `on_message` and `on_turn` are called in the link's thread, the latter 20 times a second;
-    `on_component` with messages of the vehicle's cameras and gimbals that have ids of their own;
+    `on_component` with every message of the vehicle's components that have `component_ids`;
     `healthy` before each heartbeat: no heartbeat without a working control loop. Every message
     before `adopt` counts as the vehicle's; from then on only those from its own address. After a
     silence it may have another one, if it `stands` on the ground or if packets are signed.
@@ -97,6 +97,7 @@ class MavlinkLink:
         stands: Callable[[], bool],
         messages: Collection[str],
         equipment: Mapping[str, Collection[int]] = MappingProxyType({}),
+        component_ids: frozenset[int] = frozenset(),
     ) -> None:
         """Prepare the link of robot `name`; raises ConfigError for a bad key. Opens nothing.
 
@@ -118,7 +119,7 @@ class MavlinkLink:
             # Vehicles on one radio hear what is signed for each: none may seem another's replay.
             sign_with(self._mav, self.key, settings.system or 0)
         self._stands = stands
-        self.pins = SenderPins(lambda: self.key is not None or stands())
+        self.pins = SenderPins(lambda: self.key is not None or stands(), component_ids)
         self._refused_at = -math.inf
         self._equipment = equipment
         self._wanted = {_MESSAGE_IDS[name] for name in (*messages, *equipment)}

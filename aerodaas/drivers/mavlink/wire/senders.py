@@ -7,12 +7,7 @@ from collections.abc import Callable
 from aerodaas.drivers.mavlink.wire.framing import senders
 from aerodaas.drivers.pin import Peer, Pin
 
-__all__ = ["CAMERAS", "GIMBALS", "Sender", "SenderPins"]
-
-CAMERAS = frozenset(range(100, 106))
-"""Component ids of cameras (MAV_COMP_ID_CAMERA to CAMERA6)."""
-GIMBALS = frozenset({154, *range(171, 176)})
-"""Component ids of gimbals (MAV_COMP_ID_GIMBAL to GIMBAL6)."""
+__all__ = ["Sender", "SenderPins"]
 
 Sender = tuple[int, int]
 """System and component."""
@@ -27,11 +22,17 @@ class SenderPins:
     The vehicle's own one is a `Pin`. Others never move: only what is forwarded depends on them.
     """
 
-    def __init__(self, may_move: Callable[[], bool]) -> None:
-        """Know no sender; `may_move` decides whether the vehicle may change its address."""
+    def __init__(
+        self, may_move: Callable[[], bool], component_ids: frozenset[int] = frozenset()
+    ) -> None:
+        """Know no sender; `may_move` decides whether the vehicle may change its address.
+
+        `component_ids` are those of the vehicle's own equipment.
+        """
         self.target: Sender | None = None
         """The vehicle, once it is adopted."""
         self.pin = Pin("the vehicle", may_move)
+        self._component_ids = component_ids
         self._others: dict[Sender, Peer] = {}
 
     def adopt(self, target: Sender, peer: Peer, now: float) -> None:
@@ -57,7 +58,7 @@ class SenderPins:
             self._others.setdefault(sender, peer)
 
     def carries(self, sender: Sender, peer: Peer) -> bool:
-        """Whether a packet is of a camera or gimbal of the vehicle, from the vehicle's address.
+        """Whether a packet is of the vehicle's own equipment, from the vehicle's address.
 
         Args:
             sender: System and component id of the packet.
@@ -65,7 +66,7 @@ class SenderPins:
         """
         target = self.target
         known = target is not None and sender[0] == target[0] and sender != target
-        return known and sender[1] in CAMERAS | GIMBALS and peer == self.pin.address
+        return known and sender[1] in self._component_ids and peer == self.pin.address
 
     @property
     def addresses(self) -> tuple[Peer, ...]:

@@ -1,4 +1,4 @@
-"""Shared by the tests of gimbal and camera."""
+"""Shared by the tests of extensions."""
 
 from emulated import flight
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.drivers.mavlink.payload.camera_status import SCHEMES, video_stream
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.extensions.payload.mavlink.camera_status import SCHEMES, video_stream
 
 
 def told(uri: bytes, name: bytes = b"", rate: float = 30.0) -> object:

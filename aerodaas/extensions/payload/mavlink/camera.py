@@ -22,16 +22,9 @@ from aerodaas.drivers.mavlink.microservices.commander import (
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.errors import VehicleError
+from aerodaas.extensions.payload.equipment import LensTarget, PhotoFailure, PhotoOutcome
 from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.payload import (
-    CameraStatus,
-    GimbalAttitude,
-    LensTarget,
-    Photo,
-    PhotoFailure,
-    PhotoOutcome,
-    PhotoPlace,
-)
+from aerodaas.messages.payload import CameraStatus, GimbalAttitude, Photo, PhotoPlace
 
 __all__ = ["MavlinkCamera", "MavlinkLens", "MavlinkRecorder", "Moment"]
 
@@ -224,7 +217,7 @@ class _Request:
 
 
 class MavlinkCamera:
-    """One camera; implements `aerodaas.messages.payload.PhotoCamera`. The caller locks."""
+    """One camera; implements `PhotoCamera`. The caller locks."""
 
     def __init__(
         self,

@@ -8,26 +8,68 @@ depend on how fast the machine is.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
+from aerodaas.cameras.settings import camera_settings
 from aerodaas.clock import NANOSECONDS
-from aerodaas.config.model import CameraConfig, GimbalConfig
+from aerodaas.config.model import CameraConfig, EnvironmentConfig, GimbalConfig, RobotConfig
 from aerodaas.config.sections.robot import SIMULATED_INTERVAL
 from aerodaas.errors import VehicleError
-from aerodaas.messages.payload import (
-    GimbalAttitude,
-    GimbalTarget,
-    LensTarget,
-    Photo,
-    PhotoOutcome,
-    PhotoPlace,
-)
+from aerodaas.extensions.payload.equipment import GimbalTarget, LensTarget, PhotoOutcome
+from aerodaas.messages.payload import GimbalAttitude, Photo, PhotoPlace
 from aerodaas.messages.vehicle import VehicleState
+from aerodaas.simulation.equipment import SimulatedEquipment
 
-__all__ = ["SimulatedGimbal", "SimulatedPhotoCamera"]
+__all__ = ["SimulatedPayload"]
+
+
+class SimulatedPayload(SimulatedEquipment):
+    """A drone's first simulated camera, and the gimbal that it hangs from; a `Payload`."""
+
+    def __init__(
+        self, robot: RobotConfig, environment: EnvironmentConfig, descend: Callable[[], None]
+    ) -> None:
+        """Carry what `robot` has."""
+        super().__init__(robot, environment, descend)
+        self.photo_camera: SimulatedPhotoCamera | None = None
+        """None without a simulated camera."""
+        self.gimbal: SimulatedGimbal | None = None
+        """None if the camera is bolted to the body."""
+        for sensor in robot.sensors:
+            if sensor.type == "camera" and environment.camera_driver(sensor) == "simulated":
+                settings = camera_settings(sensor)
+                self.photo_camera = SimulatedPhotoCamera(settings)
+                if settings.gimbal is not None:
+                    self.gimbal = SimulatedGimbal(settings.gimbal, settings)
+                break
+
+    @property
+    def awaits_state(self) -> bool:
+        """Whether a picture is to be exposed."""
+        return self.photo_camera is not None and self.photo_camera.waits
+
+    def on_state(self, state: VehicleState) -> None:
+        """Expose the picture."""
+        if self.photo_camera is not None:
+            self.photo_camera.expose(state)
+
+    def advance_to(self, stamp: int) -> None:
+        """Turn the gimbal, and store pictures."""
+        if self.gimbal is not None:
+            self.gimbal.advance_to(stamp)
+        if self.photo_camera is not None:
+            self.photo_camera.advance_to(stamp)
+
+    def complete(self, state: VehicleState) -> VehicleState:
+        """Add where the gimbal looks, and the zoom."""
+        attitude = None if self.gimbal is None else self.gimbal.attitude
+        zoom = None if self.photo_camera is None else self.photo_camera.zoom
+        return state if attitude is zoom is None else replace(state, gimbal=attitude, zoom=zoom)
 
 
 class SimulatedGimbal:
-    """A gimbal that turns at a limited rate; implements `aerodaas.messages.payload.Gimbal`."""
+    """A gimbal that turns at a limited rate; implements `Gimbal`."""
 
     fault = ""
 

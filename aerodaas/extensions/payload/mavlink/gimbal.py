@@ -18,8 +18,9 @@ from aerodaas.drivers.mavlink.microservices.commander import (
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.errors import VehicleError
+from aerodaas.extensions.payload.equipment import GimbalTarget
 from aerodaas.geometry.frames import angles_of_rotation, wrap_angle
-from aerodaas.messages.payload import GimbalAttitude, GimbalTarget
+from aerodaas.messages.payload import GimbalAttitude
 
 __all__ = ["MavlinkGimbal"]
 
@@ -43,7 +44,7 @@ _UNIT = 0.1
 
 
 class MavlinkGimbal:
-    """One gimbal; implements `aerodaas.messages.payload.Gimbal`. The caller locks."""
+    """One gimbal; implements `Gimbal`. The caller locks."""
 
     def __init__(self, information: Message, commander: Commander) -> None:
         """Command the gimbal of a GIMBAL_MANAGER_INFORMATION by `commander`."""

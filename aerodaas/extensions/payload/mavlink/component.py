@@ -1,8 +1,7 @@
 """What a vehicle carries: gimbals and cameras, the autopilot's and those with ids of their own.
 
 They are asked for after connecting, and again in flight until they answer or refuse; nothing waits
-for them. The link's thread calls `take`, `take_component` and `turn`, the loop's thread the rest,
-under one lock.
+for them.
 """
 
 from __future__ import annotations
@@ -11,63 +10,59 @@ import itertools
 import logging
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
-from typing import ClassVar
 
-from aerodaas.clock import Clock
+from aerodaas.drivers.mavlink.component import ComponentContext, MavlinkComponent, MessageHandler
+from aerodaas.drivers.mavlink.connecting import Connection
 from aerodaas.drivers.mavlink.microservices.commander import Commander
-from aerodaas.drivers.mavlink.payload.camera import MavlinkCamera
-from aerodaas.drivers.mavlink.payload.camera_status import VideoStream
-from aerodaas.drivers.mavlink.payload.components import PayloadComponent
-from aerodaas.drivers.mavlink.payload.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.errors import VehicleError
-from aerodaas.geometry.frames import yaw_enu_to_ned
-from aerodaas.messages.health import HealthReadings
-from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.payload import (
-    CameraStatus,
+from aerodaas.extensions.payload.equipment import (
     Gimbal,
-    GimbalAttitude,
     GimbalTarget,
     LensTarget,
     PhotoCamera,
     PhotoOutcome,
 )
+from aerodaas.extensions.payload.mavlink.camera import MavlinkCamera
+from aerodaas.extensions.payload.mavlink.camera_status import VideoStream
+from aerodaas.extensions.payload.mavlink.components import CAMERAS, GIMBALS, PayloadComponent
+from aerodaas.extensions.payload.mavlink.gimbal import MavlinkGimbal
+from aerodaas.geometry.frames import yaw_enu_to_ned
+from aerodaas.messages.health import HealthReadings
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.payload import CameraStatus, GimbalAttitude
 from aerodaas.messages.vehicle import VehicleState
 
-__all__ = ["Payload"]
+__all__ = ["MavlinkPayload"]
 
 _log = logging.getLogger(__name__)
 
+_MESSAGES = (
+    *("GIMBAL_MANAGER_INFORMATION", "GIMBAL_DEVICE_ATTITUDE_STATUS"),
+    *("CAMERA_INFORMATION", "CAMERA_IMAGE_CAPTURED", "CAMERA_FEEDBACK"),
+    *("VIDEO_STREAM_INFORMATION", "STORAGE_INFORMATION", "CAMERA_CAPTURE_STATUS"),
+)
+"""Of gimbals and cameras, whoever sends them."""
 _PARTING = 2.0
 """Seconds that a recording that is to end is awaited for before the link is closed."""
 
 
-class Payload:
+class MavlinkPayload(MavlinkComponent):
     """Gimbals and cameras of one vehicle, of which one of each is used.
 
     One with an id of its own comes before the autopilot's, and of several the one with the lowest
     id: the choice depends on what is there, and not on who answered first.
     """
 
-    messages: ClassVar[frozenset[str]] = frozenset(
-        {
-            *("GIMBAL_MANAGER_INFORMATION", "GIMBAL_DEVICE_ATTITUDE_STATUS"),
-            *("CAMERA_INFORMATION", "CAMERA_IMAGE_CAPTURED", "CAMERA_FEEDBACK"),
-            *("VIDEO_STREAM_INFORMATION", "STORAGE_INFORMATION"),
-            "CAMERA_CAPTURE_STATUS",
-        }
-    )
-    """What `take` processes."""
+    component_ids = CAMERAS | GIMBALS
 
-    def __init__(self, clock: Clock, lock: AbstractContextManager[object]) -> None:
+    def __init__(self, context: ComponentContext) -> None:
         """Know of nothing yet."""
-        self.clock = clock
-        """The mission's."""
-        self._lock = lock
+        super().__init__(context)
+        self._lock = context.lock
         self._autopilot: PayloadComponent | None = None
         self._own: dict[int, PayloadComponent] = {}
         """Those with an id of their own."""
@@ -77,9 +72,15 @@ class Payload:
         self._filmed: PayloadComponent | None = None
         """Whose recording was begun or ended last."""
 
-    def search(self, commander: Commander) -> None:
-        """Begin to search, by the autopilot's `commander`."""
-        self._autopilot = self._component(commander, own=False)
+    @property
+    def handlers(self) -> Mapping[str, MessageHandler]:
+        """Handlers of the messages by which the autopilot tells of its gimbal and its camera."""
+        return dict.fromkeys(_MESSAGES, self._on_autopilot_message)
+
+    def connect(self, connection: Connection) -> None:
+        """Begin to search, first by what the autopilot itself manages."""
+        super().connect(connection)
+        self._autopilot = self._component(connection.commander, own=False)
 
     def _component(self, commander: Commander, *, own: bool) -> PayloadComponent:
         return PayloadComponent(
@@ -103,7 +104,7 @@ class Payload:
             return None if gimbal is None else _LockedGimbal(gimbal, self._lock)
 
     @property
-    def camera(self) -> PhotoCamera | None:
+    def photo_camera(self) -> PhotoCamera | None:
         """The camera; None before one is found, and while none says anything any more."""
         with self._lock:
             tells = any(
@@ -141,16 +142,12 @@ class Payload:
         """
         return self.used_camera() if self._filmed is None else self._filmed.camera_now(now)
 
-    def part(self, name: str, pause: Callable[[], None]) -> None:
-        """Wait a little for a recording that is to end.
-
-        Args:
-            name: Id of the robot, for warnings.
-            pause: Waits for the next message.
-        """
+    def close(self, pause: Callable[[], None]) -> None:
+        """Wait a little for a recording that is to end."""
         end = time.monotonic() + _PARTING
         while any(one.camera is not None and one.camera.recorder.ending for one in self._ranked()):
             if time.monotonic() >= end:
+                name = self.context.robot.id
                 _log.warning("%s: its camera has not acknowledged that its video is to end", name)
                 return
             pause()
@@ -160,14 +157,22 @@ class Payload:
         cameras = [one.camera for one in self._ranked() if one.camera is not None]
         return [outcome for camera in cameras for outcome in camera.outcomes()]
 
-    def complete_health(self, health: HealthReadings) -> HealthReadings:
-        """`health` with the cameras."""
-        return replace(health, cameras=tuple(self.cameras()))
+    def complete_health(self, readings: HealthReadings, now: float) -> HealthReadings:
+        """Add the cameras."""
+        del now
+        return replace(readings, cameras=tuple(self.cameras()))
 
-    def complete(self, state: VehicleState) -> VehicleState:
-        """`state` with the gimbal's attitude and what is wrong; it is the newest from now on."""
+    def description(self) -> list[str]:
+        """The streams of video, and each camera."""
+        cameras = self.cameras()
+        return [f"video of {camera}: {stream}" for camera, stream in self.streams()] + [
+            f"{one.name}: {one}{f'; {one.trouble}' if one.trouble else ''}" for one in cameras
+        ]
+
+    def complete(self, state: VehicleState, now: float, placed_at: float) -> VehicleState:
+        """Add the gimbal's attitude and what is wrong; the state is the newest from now on."""
+        del placed_at
         self._odometry = state.odometry
-        now = time.monotonic()
         faults = [
             f"{one.name}: no word from it any more" for one in self._own.values() if one.gone(now)
         ]
@@ -176,7 +181,7 @@ class Payload:
             for one in self._ranked()
             if one.status is not None and one.status.trouble and not one.gone(now)
         ]
-        attitude, video = self._attitude(), self._video()
+        attitude, video = self._attitude(now), self._video()
         if attitude is None and not faults and not video:
             return state
         return replace(state, gimbal=attitude, faults=(*state.faults, *faults), video=video)
@@ -199,47 +204,33 @@ class Payload:
     def _video(self) -> str:
         return next((stream.uri for _, stream in self.streams() if not stream.objection), "")
 
-    def _attitude(self) -> GimbalAttitude | None:
+    def _attitude(self, now: float) -> GimbalAttitude | None:
         """The newest word of the gimbal that is used, or was last."""
-        gimbal = self._gimbal(time.monotonic())
+        gimbal = self._gimbal(now)
         if gimbal is None:
             gimbal = next((one.gimbal for one in self._ranked() if one.gimbal is not None), None)
         return None if gimbal is None else gimbal.attitude
 
     def _moment(self) -> tuple[int, Odometry | None, GimbalAttitude | None]:
-        return self.clock.now(), self._odometry, self._attitude()
+        return self.context.now(), self._odometry, self._attitude(time.monotonic())
 
-    def on_message(self, message: Message, now: float) -> None:
-        """Process one of the autopilot's `messages`; in the link's thread.
-
-        Args:
-            message: The message.
-            now: Monotonic clock, seconds.
-        """
+    def _on_autopilot_message(self, message: Message, now: float) -> None:
         if self._autopilot is not None:
-            self._on_component_message(self._autopilot, message, now)
+            self._process(self._autopilot, message, now)
 
-    def take_component(self, message: Message, now: float) -> None:
-        """Process what a component with an id of its own says; in the link's thread.
-
-        Args:
-            message: The message.
-            now: Monotonic clock, seconds.
-        """
-        with self._lock:
-            if self._autopilot is None:
+    def on_component_message(self, message: Message, now: float) -> None:
+        """Process what a camera or a gimbal with an id of its own says."""
+        if self._autopilot is None:
+            return
+        number = message.get_srcComponent()
+        if number not in self._own:
+            if message.get_type() not in {"HEARTBEAT", *_MESSAGES}:
                 return
-            number = message.get_srcComponent()
-            if number not in self._own:
-                if message.get_type() != "HEARTBEAT" and message.get_type() not in self.messages:
-                    return
-                commander = self._autopilot.commander.to(number)
-                self._own[number] = self._component(commander, own=True)
-            self._on_component_message(self._own[number], message, now)
+            commander = self._autopilot.commander.to(number)
+            self._own[number] = self._component(commander, own=True)
+        self._process(self._own[number], message, now)
 
-    def _on_component_message(
-        self, component: PayloadComponent, message: Message, now: float
-    ) -> None:
+    def _process(self, component: PayloadComponent, message: Message, now: float) -> None:
         component.on_message(message, now)
         if message.get_type() != "GIMBAL_DEVICE_ATTITUDE_STATUS":
             return
@@ -248,10 +239,10 @@ class Payload:
         for one in self._ranked():
             # A device speaks for itself, or whoever manages it speaks for it.
             if one.gimbal is not None and component.number in {one.number, one.gimbal.device}:
-                one.gimbal.on_attitude(message, now, self.clock.now(), heading)
+                one.gimbal.on_attitude(message, now, self.context.now(), heading)
 
     def step(self, now: float) -> None:
-        """Search on, and see to the gimbals' attitudes; in the link's thread."""
+        """Search on, and see to the gimbals' attitudes."""
         for one in self._ranked():
             one.step(now)
             one.see_to_attitude(now, self._commander_of)
@@ -287,7 +278,7 @@ class _LockedGimbal:
 class _Cameras:
     """All cameras for the loop's thread: one takes pictures, all tell what became of theirs."""
 
-    def __init__(self, payload: Payload, lock: AbstractContextManager[object]) -> None:
+    def __init__(self, payload: MavlinkPayload, lock: AbstractContextManager[object]) -> None:
         self._payload = payload
         self._lock = lock
 

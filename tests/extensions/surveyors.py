@@ -1,4 +1,4 @@
-"""A vehicle with a gimbal and a camera, which do as a test says."""
+"""Vehicles with a gimbal and a camera: one that does as a test says, and the emulated one."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import EnvironmentConfig, MissionConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.simulated import SimulatedVehicle
-from aerodaas.messages.payload import (
-    GimbalAttitude,
+from aerodaas.extensions.payload.equipment import (
     GimbalTarget,
     LensTarget,
-    Photo,
     PhotoFailure,
     PhotoOutcome,
 )
-from aerodaas.messages.vehicle import VehicleState
+from aerodaas.extensions.payload.mavlink.component import MavlinkPayload
+from aerodaas.messages.payload import GimbalAttitude, Photo
+from aerodaas.messages.vehicle import VehicleState, equipment_of
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, Start
 from aerodaas.mission.loop import SetpointLoop
@@ -34,11 +34,15 @@ __all__ = [
     "Clock",
     "Gimbal",
     "Surveyor",
+    "find_payload",
     "fly_pictures",
     "lost",
     "patience",
+    "payload_of",
+    "photo_outcome",
     "simulated",
     "surveying",
+    "take_photo",
 ]
 
 
@@ -151,6 +155,11 @@ class Surveyor(KinematicVehicle):
         self.gimbal: Gimbal | None = Gimbal(self.clock)
         self.photo_camera: Camera | None = Camera(self.clock, self.gimbal)
 
+    @property
+    def equipment(self) -> tuple[Surveyor]:
+        """Both."""
+        return (self,)
+
     def read(self) -> VehicleState:
         """Let its components know the time."""
         state = super().read()
@@ -166,6 +175,41 @@ def lost(made: Flight) -> list[str]:
 def patience(timeout: float) -> MissionConfig:
     """Options by which gimbal and camera get `timeout` seconds at a waypoint."""
     return MissionConfig.model_validate({"photo_timeout": timeout})
+
+
+def payload_of(vehicle: object) -> MavlinkPayload:
+    """Gimbals and cameras of a MAVLink vehicle."""
+    payload = equipment_of(vehicle, MavlinkPayload)
+    assert payload is not None
+    return payload
+
+
+def find_payload(ends: Stepped) -> None:
+    """Wait for the gimbal's first word, and the camera."""
+    payload = payload_of(ends.vehicle)
+    ends.wait(lambda: payload.gimbal and payload.photo_camera and payload.gimbal.attitude)
+
+
+def take_photo(ends: Stepped, label: str = "wp1") -> int:
+    """Ask for a picture; its number."""
+    camera = payload_of(ends.vehicle).photo_camera
+    assert camera is not None
+    return camera.take_photo(label)
+
+
+def photo_outcome(ends: Stepped, timeout: float = 15.0) -> PhotoOutcome:
+    """The outcome of the next picture."""
+    outcomes: list[PhotoOutcome] = []
+
+    def look() -> bool:
+        camera = payload_of(ends.vehicle).photo_camera
+        assert camera is not None
+        outcomes.extend(camera.outcomes())
+        return bool(outcomes)
+
+    ends.wait(look, timeout)
+    (outcome,) = outcomes
+    return outcome
 
 
 def fly_pictures(ends: Stepped, each: Callable[[Mission], None] = lambda _: None) -> Mission:

@@ -15,26 +15,30 @@ from aerodaas.drivers.mavlink.microservices.commander import (
     CommandResult,
     PendingCommand,
 )
-from aerodaas.drivers.mavlink.payload.camera import (
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.link import Message
+from aerodaas.extensions.payload.mavlink.camera import (
     MavlinkCamera,
     MavlinkLens,
     MavlinkRecorder,
     Moment,
 )
-from aerodaas.drivers.mavlink.payload.camera_status import (
+from aerodaas.extensions.payload.mavlink.camera_status import (
     VideoStream,
     video_stream,
     with_capture,
     with_card,
     with_model,
 )
-from aerodaas.drivers.mavlink.payload.gimbal import MavlinkGimbal
-from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.drivers.mavlink.wire.link import Message
-from aerodaas.drivers.mavlink.wire.senders import CAMERAS
+from aerodaas.extensions.payload.mavlink.gimbal import MavlinkGimbal
 from aerodaas.messages.payload import CameraStatus
 
-__all__ = ["PayloadComponent"]
+__all__ = ["CAMERAS", "GIMBALS", "PayloadComponent"]
+
+CAMERAS = frozenset(range(100, 106))
+"""Component ids of cameras (MAV_COMP_ID_CAMERA to CAMERA6)."""
+GIMBALS = frozenset({154, *range(171, 176)})
+"""Component ids of gimbals (MAV_COMP_ID_GIMBAL to GIMBAL6)."""
 
 _CAMERA = mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION
 _VIDEO = mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION

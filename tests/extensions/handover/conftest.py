@@ -1,5 +1,0 @@
-"""Shared by the tests of handovers."""
-
-from emulated import flight
-
-__all__ = ["flight"]
