@@ -38,7 +38,8 @@ def check_document(
     Args:
         document: The mission document.
         config: Environment in which it would fly, narrowed to what the flight may do.
-        battery: Charge by robot, 0 to 1; a robot that is not named counts as full.
+        battery: Charge by robot, 0 to 1; a robot that is not named begins with that of its
+            simulated battery, or full.
         minutes: Time within which every robot has to have landed; None for no limit.
 
     Returns:
@@ -50,7 +51,7 @@ def check_document(
             config,
             [entry for entry in document.navigation if entry.robot == robot.id],
             _planning_scheduler(document, config),
-            battery.get(robot.id),
+            battery.get(robot.id, _simulated_charge(robot)),
             minutes,
         )
         for robot in _navigated(document, config)
@@ -72,6 +73,11 @@ def _navigated(document: MissionDocument, config: EnvironmentConfig) -> list[Rob
     known = {robot.id: robot for robot in config.robots}
     names = dict.fromkeys(entry.robot for entry in document.navigation)
     return [known[name] for name in names if name in known]
+
+
+def _simulated_charge(robot: RobotConfig) -> float | None:
+    charge = robot.settings.get("battery") if robot.driver == "simulated" else None
+    return float(charge) if isinstance(charge, int | float) else None
 
 
 def _planning_scheduler(

@@ -549,12 +549,16 @@ class _PlaceCheck:
         edge = float(shapely.distance(self._polygon.exterior, point))
         kept = edge if inside else -edge
         if kept < fence.margin - _ROUNDING:
-            what = f"{edge:.1f} m inside the fence's edge" if inside else f"{edge:.1f} m outside it"
+            what = (
+                f"lies {edge:.1f} m inside the fence, of whose edge {fence.margin:g} m are kept"
+                if inside
+                else f"lies {edge:.1f} m outside the fence"
+            )
             yield self._finding(
                 "fence",
                 name,
                 place,
-                f"{where} has to keep {fence.margin:g} m inside the fence, and lies {what}",
+                f"{where} {what}",
                 remedy,
                 measured=kept,
                 limit=fence.margin,

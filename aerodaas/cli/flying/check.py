@@ -10,7 +10,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -49,7 +49,8 @@ def check(
     application: Annotated[
         Path,
         typer.Argument(
-            help="The application, as for `aerodaas run`; or an environment file alone."
+            help="The application, as for `aerodaas run`; a mission document; or an environment "
+            "file alone."
         ),
     ],
     env: OtherEnvironment = None,
@@ -73,6 +74,10 @@ def check(
     The exit code is 1 if something is to be mended. Words after `--` are the application's own.
     Of an environment file alone, all vehicles and cameras are asked.
 
+    Of a mission document, each place, height, speed, name, setting, length of way, charge and
+    distance from what stands in the simulated world is checked, and nothing is connected. Each
+    finding has its figures and a remedy; a forecast tells way, time and charge of each robot.
+
     With `--robot`, each item of one robot's health has its value, what it should be, what that
     means, and a remedy. The robot's section `preflight` in the environment file says what refuses a
     take-off and what only warns. What the vehicle does not tell is unknown, never good. The exit
@@ -81,6 +86,8 @@ def check(
         aerodaas check environment.json
         aerodaas check environment.json --robot drone --json
         aerodaas check my_app.py
+        aerodaas check mission.json --env environment.json
+        aerodaas check mission.json --env environment.json --json
         aerodaas check my_app.py --set drone.driver=mavlink --set drone.url=udpin:127.0.0.1:14540
     """
     from aerodaas.cli.doctor import show_findings  # noqa: PLC0415 - slow to load
@@ -94,7 +101,12 @@ def check(
         overrides=dict(parse_setting(text) for text in setting or ()),
         view=False,
     )
-    alone = _is_environment(application)
+    kind = _kind_of(application)
+    if kind == "document" and robot is None:
+        from aerodaas.cli.flying.document_check import check_file  # noqa: PLC0415 - as above
+
+        raise typer.Exit(0 if check_file(application, options, as_json=as_json) else 1)
+    alone = kind == "environment"
     if alone:
         current_options.set(options)
         environment = Environment(application.resolve())
@@ -152,14 +164,14 @@ def examine_application(
         yield from _hardware(environment, robots, cameras)
 
 
-def _is_environment(file: Path) -> bool:
-    """Whether a file is an environment's, and no application's."""
+def _kind_of(file: Path) -> Literal["application", "document", "environment"]:
+    """Kind of a file: an environment's, a mission document, or an application's."""
     from aerodaas.text.json_text import read_json  # noqa: PLC0415 - only for JSON
 
     if file.suffix != ".json":
-        return False
+        return "application"
     content = read_json(file, "the file")
-    return isinstance(content, dict) and "robots" in content
+    return "environment" if isinstance(content, dict) and "robots" in content else "document"
 
 
 def _environment_alone(environment: Environment, *, connect: bool) -> Iterator[Finding]:

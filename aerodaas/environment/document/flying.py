@@ -15,7 +15,13 @@ from aerodaas.errors import AeroDaaSError, ConfigError, GraphError
 from aerodaas.recording.decoding.messages import decode_json
 from aerodaas.recording.reader import Recording
 
-__all__ = ["compile_application", "fly_mission", "recorded_document"]
+__all__ = [
+    "built_document",
+    "compile_application",
+    "environment_of",
+    "fly_mission",
+    "recorded_document",
+]
 
 _MODELS = "models"
 """Folder beside a document where models lie that are not shipped."""
@@ -72,21 +78,47 @@ def fly_mission(path: Path, options: RunOptions) -> None:
     Raises:
         AeroDaaSError: For a document that is malformed, or cannot be flown here.
     """
-    document = read_mission(path)
-    current_options.set(options)
-    # A provider's catalogue needs no file.
-    provided = options.provider.url is not None
-    environment = Environment(
-        options.environment or ("" if provided else _environment_of(document, path))
-    )
+    built_document(read_mission(path), path, options).start_mission()
+
+
+def built_document(document: MissionDocument, path: Path, options: RunOptions) -> Environment:
+    """The graph of a document, built and not flown.
+
+    Args:
+        document: The content of the file.
+        path: The file. Models that are not shipped are looked up in `models/` beside it.
+        options: Of the run, as for `fly_mission`.
+
+    Raises:
+        ConfigError: If there is no environment, or it is malformed.
+        GraphError: For what cannot be flown here.
+    """
+    environment = environment_of(document, path, options)
     try:
         build_mission(document, environment, path.resolve().parent / _MODELS)
     except AeroDaaSError as error:
-        raise type(error)(f"{path}: {error}") from None
-    environment.start_mission()
+        raise GraphError(f"{path}: {error}") from None
+    return environment
 
 
-def _environment_of(document: MissionDocument, path: Path) -> Path:
+def environment_of(document: MissionDocument, path: Path, options: RunOptions) -> Environment:
+    """The environment in which a document is flown, with an empty graph.
+
+    Args:
+        document: The content of the file.
+        path: The file, beside which the environment is looked up that the document names.
+        options: Of the run; its environment file goes before that one.
+
+    Raises:
+        ConfigError: If there is none, or it is malformed.
+    """
+    current_options.set(options)
+    # A provider's catalogue needs no file.
+    provided = options.provider.url is not None
+    return Environment(options.environment or ("" if provided else _file_of(document, path)))
+
+
+def _file_of(document: MissionDocument, path: Path) -> Path:
     name = document.environment
     if name and Path(name).name == name:
         for folder in (path.parent, path.parent / _ENVIRONMENTS):
