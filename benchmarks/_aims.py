@@ -46,16 +46,12 @@ class Aim:
 
 
 _OURS, _DORA = "AeroDaaS, one node", "dora, one node"
-_PLACED = "AeroDaaS, captured where it is read"
 _FAR = "AeroDaaS, analysis on a second Ray node"
 
 AIMS = (
     Aim("latency", _OURS, "median", 0.5, of=_DORA),
     Aim("latency", _OURS, "p99", 0.5, of=_DORA),
     Aim("latency", _OURS, "cpu", 1.0, of=_DORA),
-    Aim("latency", _PLACED, "median", 0.5, of=_DORA),
-    Aim("latency", _PLACED, "p99", 0.5, of=_DORA),
-    Aim("latency", _PLACED, "cpu", 1.0, of=_DORA),
     Aim("latency", _FAR, "median", 5.0),
     Aim("footprint", "camera, all processes", "memory", 450.0),
     Aim("footprint", "hover, all processes", "in flight", 3.0),
