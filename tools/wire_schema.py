@@ -54,7 +54,7 @@ _DRAWN = ("id", "sensors", "start")
 _FIELDS: dict[str, Any] = {
     name: (RobotConfig.model_fields[name].annotation, ...) for name in _DRAWN
 }
-_HEEDED = ("cruise_speed", "geofence", "max_climb", "max_speed", "takeoff_height")
+_HEEDED = ("battery_land", "cruise_speed", "geofence", "max_climb", "max_speed", "takeoff_height")
 _LIMITS: dict[str, Any] = {
     name: (LimitsConfig.model_fields[name].annotation, ...) for name in _HEEDED
 }

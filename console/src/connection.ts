@@ -58,13 +58,17 @@ export async function ask<T>(path: string, body?: unknown, signal?: AbortSignal)
   return (await (await answered(path, body, signal)).json()) as T;
 }
 
-/** As `ask`, for an answer of any kind. */
-export async function answered(path: string, body?: unknown, signal?: AbortSignal): Promise<Response> {
+/** As `ask`, for an answer of any kind; `method` for one that is neither GET nor POST. */
+export async function answered(
+  path: string,
+  body?: unknown,
+  signal?: AbortSignal,
+  method = body === undefined ? "GET" : "POST",
+): Promise<Response> {
   const headers: Record<string, string> = { Authorization: `Bearer ${token()}` };
-  const request: RequestInit = { headers, cache: "no-store", signal: signal ?? null };
+  const request: RequestInit = { method, headers, cache: "no-store", signal: signal ?? null };
   if (body !== undefined) {
     headers["Content-Type"] = "application/json";
-    request.method = "POST";
     request.body = JSON.stringify(body);
   }
   const answer = await fetch(new URL(path, document.baseURI), request).catch(() => {

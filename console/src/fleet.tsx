@@ -76,11 +76,13 @@ export function FleetPage(props: FleetProps) {
     setSelected(new Set(selected.has(id) ? [...selected].filter((one) => one !== id) : [...selected, id]));
   const focus = rows.find((row) => row.id === chosen);
   const lost = rows.filter(({ robot }) => robot.link === "lost").length;
+  const asking = missions.find((one) => one.phase === "awaiting_approval");
   const bar = (
     <>
       <strong>{rows.length} drones</strong>
       <span class="figures">{rows.filter((row) => row.status).length} in flight</span>
       {lost > 0 && <Badge tone="bad">{lost} lost</Badge>}
+      {asking && <Button class="plain" onClick={() => onMission(asking.id)}>Review {asking.name}</Button>}
     </>
   );
   return (
@@ -256,16 +258,17 @@ function Chosen(props: { flight: Flight; account: AccountOut; row: Row; onMissio
   );
 }
 
-/** Missions, those in flight first. */
+/** Missions; first those that await an approval, then those in flight. */
 export function Missions({ missions, onMission }: { missions: MissionOut[]; onMission(id: string): void }) {
-  const rank = ({ phase }: MissionOut) => (phase === "flying" ? 0 : WAITING.has(phase) ? 1 : 2);
+  const rank = ({ phase }: MissionOut) =>
+    phase === "awaiting_approval" ? 0 : phase === "flying" ? 1 : WAITING.has(phase) ? 2 : 3;
   const ordered = [...missions].sort((one, other) => rank(one) - rank(other));
   if (ordered.length === 0) return <p class="empty">No mission yet: the first one appears here.</p>;
   return (
     <ul class="missions">
       {ordered.map((one) => (
         <li key={one.id}>
-          <Button onClick={() => onMission(one.id)}>
+          <Button class={one.phase} onClick={() => onMission(one.id)}>
             <span>
               <strong>{one.name}</strong> {one.robots.join(", ")}{" "}
               <Badge tone={PHASES[one.phase] ?? ""}>{wordsOf(one.phase)}</Badge>
@@ -274,6 +277,7 @@ export function Missions({ missions, onMission }: { missions: MissionOut[]; onMi
               {timesOf(one)} · {one.account}, {one.tenant}
               {one.reason && ` · ${one.reason}`}
             </small>
+            {one.phase === "awaiting_approval" && <span class="review">Review it</span>}
           </Button>
         </li>
       ))}

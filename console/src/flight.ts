@@ -38,7 +38,7 @@ const UNKNOWN = { x: null, y: null, z: null };
 export const GROUNDED = new Set(["idle", "preflight", "landed", "aborted"]);
 /** States in which no waypoint is flown to any more. */
 const ENDING = new Set(["returning", "landing", "landed", "aborted"]);
-const OVER = new Set<MissionOut["phase"]>(["landed", "failed", "cancelled", "refused"]);
+const OVER = new Set<MissionOut["phase"]>(["landed", "applied", "failed", "cancelled", "refused"]);
 
 export type Word = CommandIn["command"];
 
@@ -87,6 +87,11 @@ export class ClockOffset {
 
   age(serverNs: number): number | null {
     return this.least === Infinity ? null : Math.max(0, Date.now() - this.least - serverNs / 1e6);
+  }
+
+  /** Milliseconds until a moment of the server's. */
+  until(serverNs: number): number {
+    return serverNs / 1e6 - Date.now() + (this.least === Infinity ? 0 : this.least);
   }
 }
 

@@ -17,6 +17,8 @@ import {
 } from "./connection";
 import { FleetPage, Missions } from "./fleet";
 import { FlightPage, SideBySide } from "./flight_page";
+// After the pages whose styles it adds to.
+import { ApprovalPage } from "./approval";
 import { Theme, ThemeButton, useTheme } from "./page";
 import { areasOf } from "./place";
 import { Recorded } from "./recorded";
@@ -110,6 +112,9 @@ function App() {
           <strong class="name">{mission.name}</strong>
         ),
     };
+    if (mission.proposal && mission.started === null) {
+      return <ApprovalPage key={mission.id} {...page} onMission={choose} />;
+    }
     const replayed = mission.recording && account.scopes.includes("sense");
     if (!replayed || seen === mission.id) return <FlightPage key={mission.id} {...page} />;
     const other = recordings.find((one) => one.id === beside);

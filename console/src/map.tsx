@@ -38,6 +38,18 @@ export interface MapProps {
   onChoose?: (robot: string | null) => void;
   /** What a pilot does on the map. */
   pilot?: PilotTools | undefined;
+  /** What is planned, where nothing flies yet. */
+  planned?: PlannedLayer;
+}
+
+export interface PlannedLayer {
+  draw(sight: Sight): ComponentChildren;
+  /** Places that the view of all shows. */
+  points: Point[];
+  /** Classes and texts of its legend. */
+  legend: Record<string, string>;
+  /** The area that is being drawn; a click is a corner then. */
+  drawn: Drawn | null;
 }
 
 export interface PilotTools {
@@ -51,19 +63,20 @@ export interface PilotTools {
 
 /** Drones with their plans and trails, over the scenery or the tiles of a place. */
 export function FlightMap(props: MapProps) {
-  const { flight, robots, scenery, areas, chosen, onChoose, pilot } = props;
+  const { flight, robots, scenery, areas, chosen, onChoose, pilot, planned } = props;
   const fleet = flight.source.kind === "fleet";
   const box = useRef<HTMLDivElement>(null);
   /** The points that are measured between. */
   const [ruler, setRuler] = useState<Point[] | null>(null);
   const vehicles = flight.vehicles();
   const focus = vehicles.find((one) => one.id === chosen);
-  const fitted = useMemo(() => pointsOf(flight, robots), [robots, fleet || planKey(flight)]);
+  const all = useMemo(() => pointsOf(flight, robots), [robots, fleet || planKey(flight)]);
+  const fitted = planned?.points ?? all;
   const view = useView(box, fitted, focus?.position ?? null);
   const { sight } = view;
   const { size } = sight;
   const map = useArchive(scenery.tiles);
-  const drawing = pilot?.drawn ?? null;
+  const drawing = (planned ?? pilot)?.drawn ?? null;
   const marked = pilot?.marked ?? null;
   const up = focus?.position?.[2] ?? null;
   const now = fleet ? (focus?.status ? timeOf(focus.status) : 0) : flight.now;
@@ -96,6 +109,8 @@ export function FlightMap(props: MapProps) {
   useEscape(ruler ? () => setRuler(null) : drawing ? () => drawing.cancel() : unmark);
   const enter = onChoose
     ? "chooses the drone at the cross"
+    : planned
+    ? "sets a corner of the area, or a point of the measured line at the cross"
     : "sets a waypoint, a corner of the survey, or a point of the measured line at the cross";
 
   return (
@@ -127,6 +142,7 @@ export function FlightMap(props: MapProps) {
           <MarkLayer marks={marks} now={now} stale={flight.stale} sight={sight} />
           <Drones vehicles={vehicles} chosen={chosen} plans={!fleet} sight={sight} />
           <TrafficLayer traffic={traffic} own={up} stale={flight.stale} sight={sight} />
+          {planned?.draw(sight)}
           {drawing && <SurveyLayer drawn={drawing} sight={sight} box={box} />}
           {ruler && <RulerLayer points={ruler} sight={sight} />}
           {marked && (
@@ -158,13 +174,13 @@ export function FlightMap(props: MapProps) {
         <Key text="+" title="Zoom in (+)" onClick={() => view.zoom(ZOOM)} />
         <Key text="−" title="Zoom out (-)" onClick={() => view.zoom(1 / ZOOM)} />
         <Key text="All" title="Show all (0)" onClick={view.showAll} />
-        <Key text="Follow" title="Follow the drone (F)" pressed={view.follows} onClick={view.follow} />
+        {!planned && <Key text="Follow" title="Follow the drone (F)" pressed={view.follows} onClick={view.follow} />}
       </div>
       {ruler && (
         <p class="measured" role="status" data-testid="measured">{measured(ruler)}</p>
       )}
       <ul class="legend" aria-label="Legend">
-        {Object.entries({ ...(fleet ? STATES : WAYPOINTS), ...ZONES }).map(([kind, text]) => (
+        {Object.entries({ ...(planned?.legend ?? (fleet ? STATES : WAYPOINTS)), ...ZONES }).map(([kind, text]) => (
           <li key={kind} class={kind}>{text}</li>
         ))}
         <Listed name="sighted" word="seen" items={[...marks].reverse().map(({ what }) => nameOf(what))} />

@@ -248,7 +248,8 @@ function label(value: number): string {
   return String(Number(value.toFixed(2)));
 }
 
-function niceStep(least: number): number {
+/** A round step of an axis that is not shorter. */
+export function niceStep(least: number): number {
   const power = 10 ** Math.floor(Math.log10(least));
   return ([1, 2, 5, 10].find((one) => one * power >= least) ?? 10) * power;
 }

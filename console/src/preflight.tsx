@@ -21,13 +21,14 @@ const NAMES: Record<string, string> = { gps: "GPS", remote_id: "Remote ID", vehi
 
 interface PreflightProps {
   robot: string;
+  title?: string;
   /** Whether the list is still asked for. */
   live: boolean;
   open: boolean;
 }
 
 /** The panel of a drone; open while it stands on the ground. */
-export function PreflightPanel({ robot, live, open }: PreflightProps) {
+export function PreflightPanel({ robot, title = "Before take-off", live, open }: PreflightProps) {
   const path = robot && `v1/robots/${encodeURIComponent(robot)}/preflight`;
   const { answer, at, error } = usePolled(
     path,
@@ -41,9 +42,9 @@ export function PreflightPanel({ robot, live, open }: PreflightProps) {
   const gravest = items[0]?.verdict ?? null;
   const worst = items.filter((one) => one.verdict === gravest).length;
   return (
-    <details class="card preflight" open={open} aria-label="Before take-off">
+    <details class="card preflight" open={open} aria-label={title}>
       <summary>
-        <h2>Before take-off</h2>
+        <h2>{title}</h2>
         <PreflightBadge verdict={gravest} count={worst} />
         {age !== null && <span class="hint">{lasting(age)} ago</span>}
       </summary>

@@ -116,7 +116,8 @@ function requestOf(robot: string, area: Point[], settings: Settings, name: strin
   return { robot, area: corners, name, ...settings, ...view };
 }
 
-function round([east, north]: Point): Point {
+/** A place to the centimetre. */
+export function round([east, north]: Point): Point {
   return [Number(east.toFixed(2)), Number(north.toFixed(2))];
 }
 
@@ -241,7 +242,7 @@ export function SurveyPanel({ survey }: { survey: Survey }) {
           <span>Fly around no-fly zones</span>
         </label>
       )}
-      <Corners survey={survey} />
+      <Corners drawn={survey} />
       <Figures survey={survey} />
       <div class="buttons">
         <button type="submit" class="primary" disabled={plan === null}>Fly the survey</button>
@@ -253,17 +254,17 @@ export function SurveyPanel({ survey }: { survey: Survey }) {
 }
 
 /** The corners as numbers, for whoever uses no pointer or knows them. */
-function Corners({ survey }: { survey: Survey }) {
-  if (survey.area.length === 0) return null;
+export function Corners({ drawn }: { drawn: Drawn }) {
+  if (drawn.area.length === 0) return null;
   const set = (corner: number, axis: 0 | 1, value: number) => {
-    const [east, north] = survey.area[corner] ?? [0, 0];
-    survey.move(corner, axis === 0 ? [value, north] : [east, value]);
+    const [east, north] = drawn.area[corner] ?? [0, 0];
+    drawn.move(corner, axis === 0 ? [value, north] : [east, value]);
   };
   return (
     <details class="corners">
-      <summary>{survey.area.length} corners</summary>
+      <summary>{drawn.area.length} corners</summary>
       <ol>
-        {survey.area.map((point, corner) => (
+        {drawn.area.map((point, corner) => (
           <li key={corner}>
             {([0, 1] as const).map((axis) => (
               <input
