@@ -199,6 +199,9 @@ class ProposalOut(_Answer):
     """Cameras that run, and analyses of people."""
     actuators: list[str] = Field(default_factory=list)
     """Actuators that it would move, as `robot/actuator`."""
+    lapses: float | None = None
+    """Moment (Unix seconds) from which on its rehearsal is no longer good for an approval; None
+    without one."""
     approval: ApprovalOut | None = None
 
 

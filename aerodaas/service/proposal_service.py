@@ -312,6 +312,7 @@ class ProposalService:
             difference=record.difference,
             records=records_of(document, self._cameras),
             actuators=sorted(actuators_of(document)),
+            lapses=None if found.verdict is None else record.conditions.at + VERDICT_SECONDS,
             approval=record.approval,
         )
         return found.model_copy(update={"proposal": proposal})

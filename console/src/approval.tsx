@@ -80,6 +80,7 @@ function Review({ flight, proposal, account, fleet, areas, onMission }: ReviewPr
     ...{ points, drawn, legend: LEGEND },
     draw: (sight: Sight) => <PlannedLayer {...{ ways, clearance, sight }} />,
   };
+  const moment = proposal.approval?.lapses ?? proposal.lapses;
   const body = { hash: proposal.hash, envelope, actuators: ticked };
   return (
     <>
@@ -138,7 +139,7 @@ function Review({ flight, proposal, account, fleet, areas, onMission }: ReviewPr
       <Decision
         {...{ mission, account, objection, body, onMission }}
         proposal={proposal}
-        lapses={proposal.approval && flight.clock.until(1e9 * proposal.approval.lapses) / 1000}
+        left={moment === null ? null : flight.clock.until(1e9 * moment) / 1000}
       />
     </>
   );
@@ -173,7 +174,7 @@ function Request({ mission, proposal }: { mission: MissionOut; proposal: Proposa
       <Lines
         title="Difference to what was approved before"
         lines={difference}
-        none="None: the same was approved before."
+        none="It is the first of its name."
         testid="difference"
       />
       <Lines
@@ -309,13 +310,13 @@ interface DecisionProps {
   objection: string;
   /** What is approved. */
   body: ApprovalIn & { actuators: string[] };
-  /** Seconds after which the approval is no longer good; null without one. */
-  lapses: number | null;
+  /** Seconds for which approval or rehearsal are good; null without one. */
+  left: number | null;
   onMission(id: string): void;
 }
 
 /** The bar of the decision, which stays in sight. */
-function Decision({ mission, proposal, account, objection, body, lapses, onMission }: DecisionProps) {
+function Decision({ mission, proposal, account, objection, body, left, onMission }: DecisionProps) {
   const [asked, setAsked] = useState<"approve" | "refuse" | null>(null);
   const [sending, setSending] = useState(false);
   const [problem, setProblem] = useState("");
@@ -352,7 +353,7 @@ function Decision({ mission, proposal, account, objection, body, lapses, onMissi
         />
       ) : (
         <>
-          <p role="status" data-testid="now">{nowOf(mission, objection || lacking, lapses)}</p>
+          <p role="status" data-testid="now">{nowOf(mission, objection || lacking, left)}</p>
           <div class="buttons">
             {waits && !objection && (
               <Button class="primary approve" disabled={lacking !== ""} onClick={() => setAsked("approve")}>
@@ -401,14 +402,12 @@ function Sure({ text, word, sending, onSure, onCancel }: SureProps) {
   );
 }
 
-/** What the mission waits for. */
-function nowOf({ phase, reason, proposal }: MissionOut, objection: string, lapses: number | null): string {
-  if (phase === "awaiting_approval") return objection || "Approve only what you have read on this page.";
-  if (phase === "proposed") return "Kept, not rehearsed or asked for yet.";
-  if (proposal?.approval && phase === "queued") {
-    const left = lapses === null || lapses < 0 ? "has lapsed" : `lapses in ${clock(lapses)} min`;
-    return `Approved by ${proposal.approval.account}; the approval ${left}. ${reason}`;
-  }
+/** What the mission waits for, and for how long that is good. */
+function nowOf({ phase, reason, proposal }: MissionOut, objection: string, left: number | null): string {
+  const good = left === null ? "" : left > 0 ? ` is good for ${clock(left)} min.` : " has lapsed.";
+  if (phase === "awaiting_approval") return objection || `Approve only what you have read here. Its rehearsal${good}`;
+  const approval = proposal?.approval;
+  if (approval && phase === "queued") return `Approved by ${approval.account}; the approval${good} ${reason}`;
   return reason ? `${wordsOf(phase)}: ${reason}` : wordsOf(phase);
 }
 
