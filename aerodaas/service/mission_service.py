@@ -535,7 +535,7 @@ class MissionService:
             MissionPhase.FLYING: self._watch,
         }
         step = steps.get(active.phase)
-        if step is not None:
+        if step is not None and not self.proposals.cancel_obsolete(active):
             step(active)
 
     def _begin(self, active: ActiveMission) -> None:

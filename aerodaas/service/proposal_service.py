@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import secrets
+import threading
 import time
 from collections import defaultdict, deque
 from collections.abc import Callable, Collection
@@ -13,11 +14,21 @@ from typing import Any
 from aerodaas.clock import WallOffset
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.mission_document import MissionDocument
-from aerodaas.protocol.proposals import ApprovalIn, ApprovalOut, ProposalIn, ProposalOut
+from aerodaas.documents.checking import check_document
+from aerodaas.errors import AeroDaaSError
+from aerodaas.protocol.proposals import (
+    ApprovalIn,
+    ApprovalOut,
+    ChangeIn,
+    CheckReport,
+    ProposalIn,
+    ProposalOut,
+)
 from aerodaas.protocol.schemas import MissionIn, MissionOut, MissionPhase, VerdictOut
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.fleet.fleet_registry import FleetRegistry
+from aerodaas.service.flight_changes import FlightChanges
 from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.orders import FlightOrder, FlightOrders, actuators_of
 from aerodaas.service.leases.lease_service import LeaseService
@@ -26,10 +37,12 @@ from aerodaas.service.mission_table import MissionTable
 from aerodaas.service.models.model_store import require_room
 from aerodaas.service.proposals import (
     APPROVAL_SECONDS,
+    CHARGE_POINTS,
     VERDICT_SECONDS,
     Conditions,
     ProposalRecord,
     difference,
+    encloses,
     lapse_reason,
     plain_text,
     proposal_hash,
@@ -43,7 +56,9 @@ __all__ = ["ProposalService"]
 
 _MOST_PROPOSALS = 20
 """Most proposals of an account that are not over: each is a folder, and a line for a person."""
-_HOUR = 3600.0
+_HOUR, _MINUTE = 3600.0, 60.0
+_CHECK_PATIENCE = 10.0
+"""Wall seconds for which a check waits for others."""
 _MOST_COMPARED = 100
 """Newest missions of a tenant among which the last approved one of the same name is looked for."""
 
@@ -73,10 +88,12 @@ class ProposalService:
         self._leases = leases
         self._registry = registry
         self._clock = clock
+        self._changes = FlightChanges()
+        self._checking = threading.Lock()
         self._rehearsals: dict[str, deque[float]] = defaultdict(deque)
         """Moments of the rehearsals of the last hour, by account."""
-        self.on_lapse: Callable[[Mission, str], None] = lambda _row, _text: None
-        """Called with a proposal whose approval, or request of one, has lapsed, and why."""
+        self.audit: Callable[[str, Mission, str], None] = lambda _action, _row, _text: None
+        """Called with what the service itself does to a proposal, and its hash and reason."""
         self._cameras = {
             sensor.full_id for sensor in settings.config.all_sensors() if sensor.type == "camera"
         }
@@ -97,10 +114,64 @@ class ProposalService:
         robots = self._orders.check(principal, document)
         if proposal.parent is not None:
             self._own(principal, proposal.parent)
-        fingerprint = fingerprint_of(proposal.model_copy(update={"why": ""}))
+        row = self._row(principal, document, robots, proposal.minutes)
+        row = replace(
+            row,
+            reason="rehearse it next",
+            fingerprint=fingerprint_of(proposal.model_copy(update={"why": ""})),
+        )
+        record = ProposalRecord(
+            conditions=self._conditions(robots, self._orders.rehearsal(row)),
+            parent=proposal.parent,
+            why=plain_text(proposal.why),
+            difference=self._difference(row, document, proposal.parent),
+        )
+        return self._added(row, document, record)
+
+    def change(self, principal: Principal, mission: str, change: ChangeIn) -> MissionOut:
+        """Keep a change of a mission in flight, and have it rehearsed from where its robot is.
+
+        It is applied at once where it lies within what was approved beforehand; otherwise it waits
+        for an approval of its own.
+
+        Args:
+            principal: The account that proposed the mission.
+            mission: Id of the mission.
+            change: The robot, and the waypoints that replace its own.
+
+        Raises:
+            RefusedError: If the robot does not take other waypoints now, its check finds a reason
+                against these, or after too many rehearsals of an hour.
+        """
+        host = self._own(principal, mission)
+        before = self._record(host)
+        document = self._changes.document(host, change, before.approval)
+        lease = None if host.row.lease is None else self._leases.lease(host.row.lease)
+        left = 0.0 if lease is None or lease.ends is None else lease.ends - self._leases.now()
+        if left <= 0.0:
+            raise RefusedError(409, f"the lease of {mission} has ended")
+        row = self._row(principal, document, [change.robot], left / _MINUTE)
+        row = replace(
+            row,
+            phase=MissionPhase.REHEARSING,
+            fingerprint=fingerprint_of(change.model_copy(update={"why": ""})),
+        )
+        record = ProposalRecord(
+            conditions=self._conditions(row.robots, self._orders.rehearsal(row)),
+            change_of=mission,
+            why=plain_text(change.why),
+            difference=self._difference(row, document, mission),
+        )
+        self._require_checked(row, document)
+        return self._added(row, document, record)
+
+    def _row(
+        self, principal: Principal, document: MissionDocument, robots: list[str], minutes: float
+    ) -> Mission:
+        """A new row of a proposal, still without its record."""
         id_ = secrets.token_hex(6)
-        submission = MissionIn(document=document, minutes=proposal.minutes)
-        row = Mission(
+        submission = MissionIn(document=document, minutes=minutes)
+        return Mission(
             id=id_,
             name=plain_text(document.name) or "mission",
             tenant=principal.tenant,
@@ -110,36 +181,72 @@ class ProposalService:
             submitted=time.time(),
             folder=str(self._table.path(id_)),
             request=submission.model_dump(mode="json", exclude={"document"}),
-            reason="rehearse it next",
-            fingerprint=fingerprint,
         )
-        record = ProposalRecord(
-            conditions=self._conditions(robots, self._orders.rehearsal(row)),
-            parent=proposal.parent,
-            why=plain_text(proposal.why),
-            difference=self._difference(row, document, proposal.parent),
-        )
+
+    def _added(self, row: Mission, document: MissionDocument, record: ProposalRecord) -> MissionOut:
+        """Keep a proposal, or find the same one that is not over; raises RefusedError."""
         row = replace(row, request={**row.request, "proposal": record.model_dump(mode="json")})
 
         def find() -> ActiveMission | None:
             own = [
                 active
                 for active in self._table.missions.values()
-                if active.row.account == principal.account
-                and not active.over
-                and active.is_proposal
+                if active.row.account == row.account and not active.over and active.is_proposal
             ]
-            found = next((one for one in own if one.row.fingerprint == fingerprint), None)
-            if found is None and len(own) >= _MOST_PROPOSALS:
+            for active in own:
+                same = active.row.fingerprint == row.fingerprint
+                if same and self._record(active).change_of == record.change_of:
+                    return active
+            if len(own) >= _MOST_PROPOSALS:
                 raise RefusedError(
                     429,
-                    f"{principal.account} has {_MOST_PROPOSALS} proposals that are not over: "
+                    f"{row.account} has {_MOST_PROPOSALS} proposals that are not over: "
                     "cancel some (DELETE /v1/missions/ID)",
                     retry_after=60.0,
                 )
-            return found
+            if row.phase is MissionPhase.REHEARSING:
+                self._count_rehearsal(row.account)
+            return None
 
         return self.shown(self._table.add(row, document, find))
+
+    def check(self, principal: Principal, mission: str) -> CheckReport:
+        """Check a proposal without flying, from the present charge of its robots.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the proposal.
+
+        Raises:
+            RefusedError: If there is none, or others are being checked.
+        """
+        active = self._table.seen(principal, mission)
+        if not active.is_proposal:
+            raise RefusedError(409, f"{mission} is no proposal: it was submitted to be flown")
+        return self._report(active.row, active.document())
+
+    def _report(self, row: Mission, document: MissionDocument) -> CheckReport:
+        order = self._orders.rehearsal(row)
+        config = environment_of(order.model_copy(update={"rehearsal": False}))
+        # One at a time: each takes a core, which flights and the service need.
+        if not self._checking.acquire(timeout=_CHECK_PATIENCE):
+            text = "other proposals are being checked: ask again in a moment"
+            raise RefusedError(429, text, retry_after=_CHECK_PATIENCE)
+        try:
+            return check_document(document, config, battery=order.battery, minutes=order.minutes)
+        finally:
+            self._checking.release()
+
+    def _require_checked(self, row: Mission, document: MissionDocument) -> None:
+        """Raise RefusedError for a document with findings: a rehearsal would only take longer."""
+        report = self._report(row, document)
+        if not report.passed:
+            first = report.findings[0]
+            raise RefusedError(
+                409,
+                f"its check has {len(report.findings)} findings, of which the first is: "
+                f"{first.text}; {first.remedy}",
+            )
 
     def rehearse(self, principal: Principal, mission: str, seeds: int) -> MissionOut:
         """Have a proposal flown in simulation; one that is being rehearsed goes on.
@@ -150,10 +257,14 @@ class ProposalService:
             seeds: Flights in simulation, each with another seed.
 
         Raises:
-            RefusedError: If it waits for an approval or flies, or after too many of an hour.
+            RefusedError: If its check finds a reason against it, if it waits for an approval or
+                flies, or after too many of an hour.
         """
+        phases = (MissionPhase.PROPOSED, MissionPhase.REHEARSING)
+        active = self._own(principal, mission, *phases)
+        self._require_checked(active.row, active.document())
         with self._table.lock:
-            active = self._own(principal, mission, MissionPhase.PROPOSED, MissionPhase.REHEARSING)
+            active = self._own(principal, mission, *phases)
             if active.phase is MissionPhase.PROPOSED:
                 self._count_rehearsal(principal.account)
                 record = self._record(active).model_copy(update={"seeds": seeds})
@@ -179,19 +290,71 @@ class ProposalService:
 
     def begin(self, active: ActiveMission, order: FlightOrder) -> None:
         """Keep the conditions of a rehearsal that begins, if it is a proposal's."""
-        if active.is_proposal:
-            conditions = self._conditions(order.robots, order)
-            record = self._record(active).model_copy(update={"conditions": conditions})
-            active.change(
-                request={**active.row.request, "proposal": record.model_dump(mode="json")}
-            )
+        if not active.is_proposal:
+            return
+        record = self._record(active)
+        if (host := self._host(record)) is not None:
+            active.write(self._changes.renewed(host, active.document()))
+        conditions = self._conditions(order.robots, order)
+        self._keep(active, record.model_copy(update={"conditions": conditions}))
 
     def judge(self, active: ActiveMission, verdict: VerdictOut) -> None:
-        """Keep the verdict on a proposal, which its proposer goes on from."""
-        reason = "its rehearsal was good: request its approval"
+        """Keep the verdict on a proposal, which its proposer goes on from.
+
+        A change is applied, waits for an approval, or is over.
+        """
+        record, kept = self._record(active), verdict.model_dump(mode="json")
+        if (host := self._host(record)) is None:
+            reason = "its rehearsal was good: request its approval"
+            if not verdict.approved:
+                reason = "its rehearsal was not good, as its verdict says: propose a better one"
+            active.set_phase(MissionPhase.PROPOSED, reason, verdict=kept)
+            return
+        active.change(verdict=kept)
+        allowed = self._record(host).approval
         if not verdict.approved:
-            reason = "its rehearsal was not good, as its verdict says: propose a better one"
-        active.set_phase(MissionPhase.PROPOSED, reason, verdict=verdict.model_dump(mode="json"))
+            self._end(active, MissionPhase.REFUSED, "; ".join(verdict.reasons))
+        elif reason := self._lapse(active, limits=True):
+            self._lapse_now(active, reason)
+        else:
+            objection = "no changes were approved beforehand"
+            if allowed is not None:
+                document = active.document()
+                objection = self._changes.envelope_objection(host, document, verdict, allowed)
+            if objection:
+                told = f"waits for an operator's approval: {objection}"
+                active.set_phase(MissionPhase.AWAITING_APPROVAL, told)
+            else:
+                self._apply(active, host)
+
+    def cancel_obsolete(self, active: ActiveMission) -> bool:
+        """Cancel a change whose mission is over; returns whether it is one."""
+        if not active.is_proposal or (name := self._record(active).change_of) is None:
+            return False
+        host = self._table.missions.get(name)
+        if host is not None and host.phase is MissionPhase.FLYING:
+            return False
+        active.end_rehearsal()
+        self._end(active, MissionPhase.CANCELLED, f"{name}, which it changes, is over")
+        return True
+
+    def _apply(self, active: ActiveMission, host: ActiveMission) -> None:
+        """Have a change flown, if its way from where the robot is now has no findings either."""
+        try:
+            document = self._changes.renewed(host, active.document())
+            self._require_checked(active.row, document)
+            reason = self._changes.apply(host, document)
+        except AeroDaaSError as error:
+            reason = str(error)
+        if reason:
+            self._end(active, MissionPhase.REFUSED, reason)
+        else:
+            self._end(active, MissionPhase.APPLIED, f"{host.row.id} flies it")
+
+    def _end(self, active: ActiveMission, phase: MissionPhase, reason: str) -> None:
+        told = f"{self._hash(active, active.document())} {phase.value}: {reason}"
+        self.audit("proposal.end", active.row, told)
+        active.set_phase(phase, reason, ended=time.time())
 
     def request_approval(self, principal: Principal, mission: str) -> MissionOut:
         """Ask for the approval of a proposal; one that waits for it goes on waiting.
@@ -269,6 +432,12 @@ class ProposalService:
             raise RefusedError(
                 409, f"{row.id} moves {', '.join(missing)}: tick them, or have it proposed without"
             )
+        if approval.envelope is not None and not encloses(approval.envelope.area):
+            raise RefusedError(
+                422,
+                "the envelope's area encloses nothing or crosses itself: name its corners in "
+                "their order",
+            )
         at = self._unix(record.conditions)
         given = ApprovalOut(
             account=principal.account,
@@ -279,7 +448,11 @@ class ProposalService:
             actuators=sorted(approval.actuators),
         )
         record = record.model_copy(update={"approval": given})
-        self._set(active, MissionPhase.QUEUED, f"approved by {principal.account}", record)
+        if (host := self._host(record)) is None:
+            self._set(active, MissionPhase.QUEUED, f"approved by {principal.account}", record)
+        else:
+            self._keep(active, record)
+            self._apply(active, host)
 
     def has_lapsed(self, active: ActiveMission, *, limits: bool = False) -> bool:
         """Whether a proposal may not go on as it is, in which case it is proposed anew.
@@ -336,7 +509,8 @@ class ProposalService:
         if not 0 <= age + 1.0 <= longest + 1.0:
             return f"it is {age:.0f} s old, and is good for {longest:.0f} s"
         order = self._orders.rehearsal(active.row) if limits else None
-        if reason := lapse_reason(rehearsed, self._conditions(active.row.robots, order)):
+        present = self._conditions(active.row.robots, order)
+        if reason := lapse_reason(rehearsed, present, self._spare(active, record)):
             return reason
         if (
             limits
@@ -346,22 +520,45 @@ class ProposalService:
             return "the proposal is another one"
         return ""
 
+    def _spare(self, active: ActiveMission, record: ProposalRecord) -> float:
+        """Share of a full charge that a robot may have lost since its rehearsal.
+
+        In flight that is what the rehearsal has brought home beyond the robot's reserve.
+        """
+        used = None if active.row.verdict is None else active.row.verdict["battery_used"]
+        charge = list(record.conditions.battery.values())
+        if record.change_of is None or used is None or not charge:
+            return CHARGE_POINTS
+        (robot,) = active.row.robots
+        limits = next(one.limits for one in self._settings.config.robots if one.id == robot)
+        return max(0.0, charge[0] - used - limits.battery_return)
+
     def _lapse_now(self, active: ActiveMission, reason: str) -> str:
         """Have a proposal go on from its beginning; returns the reason in words."""
         record = self._record(active)
         what = "approval" if record.approval is not None else "rehearsal"
         told = f"the {what} has lapsed: {reason}: rehearse it again"
-        self.on_lapse(active.row, f"{self._hash(active, active.document())} {told}")
+        if record.change_of is not None:
+            self._end(active, MissionPhase.REFUSED, told)
+            return told
+        self.audit("proposal.lapse", active.row, f"{self._hash(active, active.document())} {told}")
         self._leases.give_back(active.row)
         active.handing_over = False
         record = record.model_copy(update={"approval": None})
         changes = {"lease": None, "verdict": None}
         if active.phase is MissionPhase.PROPOSED:
-            request = {**active.row.request, "proposal": record.model_dump(mode="json")}
-            active.change(reason=told, request=request, **changes)
+            self._keep(active, record, reason=told, **changes)
         else:
             self._set(active, MissionPhase.PROPOSED, told, record, **changes)
         return told
+
+    def _keep(self, active: ActiveMission, record: ProposalRecord, **changes: object) -> None:
+        request = {**active.row.request, "proposal": record.model_dump(mode="json")}
+        active.change(request=request, **changes)
+
+    def _host(self, record: ProposalRecord) -> ActiveMission | None:
+        """The mission that a proposal changes; None for a mission of its own."""
+        return None if record.change_of is None else self._table.any(record.change_of)
 
     def _set(
         self,

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
+import shapely
 from pydantic import BaseModel, ConfigDict, Field
 
 from aerodaas.clock import WallOffset
@@ -20,15 +21,19 @@ from aerodaas.dataflow.mission_document import (
     MissionDocument,
     NavigationDocument,
 )
+from aerodaas.messages.mission import Place
 from aerodaas.messages.waypoints import Waypoint, WaypointType
-from aerodaas.protocol.proposals import ApprovalOut
+from aerodaas.protocol.proposals import ApprovalOut, Envelope
 
 __all__ = [
     "APPROVAL_SECONDS",
+    "CHARGE_POINTS",
     "VERDICT_SECONDS",
     "Conditions",
     "ProposalRecord",
     "difference",
+    "encloses",
+    "envelope_violation",
     "lapse_reason",
     "plain_text",
     "proposal_hash",
@@ -40,7 +45,7 @@ APPROVAL_SECONDS = 600.0
 """For a take-off after its approval: whoever approved has the place before their eyes so long."""
 VERDICT_SECONDS = 1800.0
 """For an approval after the rehearsal: time to call a person, in which weather hardly changes."""
-_CHARGE_POINTS = 0.03
+CHARGE_POINTS = 0.03
 """Share of a full charge that a drone may lose after its rehearsal: minutes of standing ready."""
 _WIND_MARGIN = 1.0
 """m/s by which the wind may exceed what was rehearsed: an anemometer's error."""
@@ -108,16 +113,17 @@ def proposal_hash(
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def lapse_reason(rehearsed: Conditions, present: Conditions) -> str:
+def lapse_reason(rehearsed: Conditions, present: Conditions, spare: float = CHARGE_POINTS) -> str:
     """Why a rehearsal says nothing of a flight any more; empty if it still does.
 
     Args:
         rehearsed: Conditions of the rehearsal.
         present: Conditions now; without limits where these were not looked at.
+        spare: Share of a full charge that each robot may have lost since.
     """
     for robot, charge in rehearsed.battery.items():
         now = present.battery.get(robot, charge)
-        if charge - now > _CHARGE_POINTS + _ROUNDING:
+        if charge - now > spare + _ROUNDING:
             return f"{robot} holds {now:.0%}, and was rehearsed with {charge:.0%}"
     if present.wind > rehearsed.wind + _WIND_MARGIN:
         return f"the wind is {present.wind:.1f} m/s, and was rehearsed up to {rehearsed.wind:.1f}"
@@ -127,6 +133,33 @@ def lapse_reason(rehearsed: Conditions, present: Conditions) -> str:
             name for name in sorted(names) if rehearsed.limits.get(name) != present.limits.get(name)
         ]
         return f"limits have changed since: {', '.join(changed)}"
+    return ""
+
+
+def encloses(area: Sequence[tuple[float, float]]) -> bool:
+    """Whether corners in this order enclose an area."""
+    polygon = shapely.Polygon(area)
+    return polygon.is_valid and polygon.area > 0.0
+
+
+def envelope_violation(envelope: Envelope, places: Sequence[Place], minutes: float) -> str:
+    """What of a way lies outside an envelope; empty if nothing does.
+
+    Args:
+        envelope: Bounds that were approved.
+        places: Where the robot is and its waypoints, which it flies to on straight legs.
+        minutes: From its take-off to its landing.
+    """
+    way = shapely.LineString([(east, north) for east, north, _ in places])
+    if not shapely.Polygon(envelope.area).covers(way):
+        return "a leg leaves the approved area"
+    heights = [up for _, _, up in places]
+    if min(heights) < envelope.floor:
+        return f"it flies {min(heights):.1f} m high, and {envelope.floor:g} m are the least"
+    if max(heights) > envelope.ceiling:
+        return f"it flies {max(heights):.1f} m high, and {envelope.ceiling:g} m are the most"
+    if not minutes <= envelope.minutes:
+        return f"it lands after {minutes:.1f} min, and {envelope.minutes:g} min were approved"
     return ""
 
 

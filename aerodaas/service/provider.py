@@ -67,10 +67,11 @@ def build_service(
         settings, store, leases=leases, registry=registry, models=models, monitor=monitor
     )
 
-    def audit_lapse(proposal: Mission, text: str) -> None:
-        audit.write(None, "proposal.lapse", proposal.id, text, accepted=True, required=False)
+    def audit_proposal(action: str, proposal: Mission, text: str) -> None:
+        told = f"{proposal.account}: {text}"
+        audit.write(None, action, proposal.id, told, accepted=True, required=False)
 
-    missions.proposals.on_lapse = audit_lapse
+    missions.proposals.audit = audit_proposal
     admission = Admission(access, audit)
     shown: dict[str, Any] = catalogue(settings.config).model_dump(mode="json", by_alias=True)
     fleet = FleetView(settings.config, shown, settings.actuators, registry, leases, missions, store)

@@ -38,7 +38,9 @@ MAY = {
     ("GET", "/v1/missions/{mission}/playback/picture"),
     ("POST", "/v1/missions/{mission}/commands"),
     ("DELETE", "/v1/missions/{mission}"),
+    ("POST", "/v1/missions/{mission}/changes"),
     ("POST", "/v1/proposals"),
+    ("GET", "/v1/proposals/{mission}/check"),
     ("POST", "/v1/proposals/{mission}/rehearse"),
     ("POST", "/v1/proposals/{mission}/request"),
 }
@@ -49,6 +51,7 @@ BODIES: dict[tuple[str, str], Any] = {
     ("POST", "/v1/proposals"): {"document": document("one", (5.0, 0.0))},
     ("POST", "/v1/missions/{mission}/commands"): {"robot": "one", "command": "pause"},
     ("POST", "/v1/missions/{mission}/navigation"): {"robot": "one", "waypoints": [WAYPOINT]},
+    ("POST", "/v1/missions/{mission}/changes"): {"robot": "one", "waypoints": [WAYPOINT]},
     ("POST", "/v1/missions/{mission}/plan"): {"robot": "one", "remove": ["w"]},
     ("POST", "/v1/missions/{mission}/actuators"): {
         "robot": "one",

@@ -20,7 +20,7 @@ from aerodaas.errors import ConfigError, SourceError
 from aerodaas.messages.health import HealthReport
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
-from aerodaas.protocol.proposals import ApprovalIn, ProposalIn, RehearseIn
+from aerodaas.protocol.proposals import ApprovalIn, ChangeIn, CheckReport, ProposalIn, RehearseIn
 from aerodaas.protocol.schemas import (
     AccountIn,
     AccountOut,
@@ -215,6 +215,10 @@ class ProviderClient:
         """Propose a mission, which nothing flies by; the same one again is the same proposal."""
         return self._ask(MissionOut, "POST", "/v1/proposals", proposal)
 
+    def check(self, mission: str) -> CheckReport:
+        """Check a proposal without flying, from its drones' present charge."""
+        return self._ask(CheckReport, "GET", f"/v1/proposals/{_part(mission)}/check")
+
     def rehearse(self, mission: str, seeds: int = 3) -> MissionOut:
         """Have a proposal flown in simulation.
 
@@ -228,6 +232,15 @@ class ProviderClient:
     def request_approval(self, mission: str) -> MissionOut:
         """Ask for the approval of a proposal whose newest rehearsal was good."""
         return self._ask(MissionOut, "POST", f"/v1/proposals/{_part(mission)}/request")
+
+    def change(self, mission: str, change: ChangeIn) -> MissionOut:
+        """Propose other waypoints for a robot in flight; the answer is a proposal of its own.
+
+        Args:
+            mission: Id of the mission, which flies.
+            change: The robot and its new waypoints.
+        """
+        return self._ask(MissionOut, "POST", f"/v1/missions/{_part(mission)}/changes", change)
 
     def command(self, mission: str, command: CommandIn) -> Answer:
         """Give a robot of a flying mission a command.

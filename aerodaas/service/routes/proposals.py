@@ -1,4 +1,4 @@
-"""Proposed missions: made, rehearsed, and put to a person for approval."""
+"""Proposed missions and changes: made, checked, rehearsed, and put to a person for approval."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 from fastapi import APIRouter, Request
 
-from aerodaas.protocol.proposals import ProposalIn, RehearseIn
+from aerodaas.protocol.proposals import ChangeIn, CheckReport, ProposalIn, RehearseIn
 from aerodaas.protocol.schemas import MissionOut, Role, Scope
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.principal import Principal
@@ -18,7 +18,7 @@ __all__ = ["ProposalRoutes"]
 
 
 class ProposalRoutes:
-    """Routes below `/v1/proposals`, for accounts with the scope `propose`."""
+    """Routes below `/v1/proposals`, and `/v1/missions/{id}/changes`, for agents."""
 
     def __init__(self, proposals: ProposalService, admission: Admission, audit: Audit) -> None:
         """Answer from `proposals`."""
@@ -28,11 +28,13 @@ class ProposalRoutes:
 
     def router(self) -> APIRouter:
         """The routes."""
-        router = api_router("/v1/proposals", "proposals")
+        router = api_router("/v1", "proposals")
         posted: dict[str, Any] = {"methods": ["POST"], "status_code": 202}
-        router.add_api_route("", self.propose, **posted)
-        router.add_api_route("/{mission}/rehearse", self.rehearse, **posted)
-        router.add_api_route("/{mission}/request", self.request, **posted)
+        router.add_api_route("/proposals", self.propose, **posted)
+        router.add_api_route("/proposals/{mission}/check", self.check)
+        router.add_api_route("/proposals/{mission}/rehearse", self.rehearse, **posted)
+        router.add_api_route("/proposals/{mission}/request", self.request, **posted)
+        router.add_api_route("/missions/{mission}/changes", self.change, **posted)
         return router
 
     def propose(self, body: ProposalIn, request: Request) -> MissionOut:
@@ -44,6 +46,22 @@ class ProposalRoutes:
         with self._admission.auditing(principal, request):
             found = self._proposals.propose(principal, body)
         return self._audited(principal, "proposal.create", found)
+
+    def check(self, mission: str, request: Request) -> CheckReport:
+        """Check a proposal without flying, from its drones' present charge."""
+        principal = self._admission.require(request, Role.VIEWER, agents=True)
+        return self._proposals.check(principal, mission)
+
+    def change(self, mission: str, body: ChangeIn, request: Request) -> MissionOut:
+        """Replace the waypoints of a robot in flight, by a proposal of its own.
+
+        It is rehearsed from where the robot is. Within the envelope that was approved with the
+        mission it is applied then; otherwise it waits for an approval.
+        """
+        principal = self._require(request)
+        with self._admission.auditing(principal, request):
+            found = self._proposals.change(principal, mission, body)
+        return self._audited(principal, "proposal.change", found)
 
     def rehearse(self, mission: str, body: RehearseIn, request: Request) -> MissionOut:
         """Have a proposal flown in simulation, as often as seeds are asked for."""
