@@ -17,6 +17,7 @@ class Near:
     place: tuple[float, float]
     """Metres east and north of home."""
     metres: float
+    """Distance from the place."""
 
     def __call__(self, result: object) -> bool:
         """Look at one result; True only for readings of `position`."""
@@ -32,7 +33,9 @@ class Below:
     """Whether a reading, such as `battery`, is below a limit."""
 
     reading: str
+    """Name of the reading, as `MonitoringAnalytics` has it."""
     limit: float
+    """In the unit of the reading."""
 
     def __call__(self, result: object) -> bool:
         """Look at one result; True only for readings that have this one."""
@@ -45,7 +48,9 @@ class Above:
     """Whether a reading, such as `height`, is above a limit."""
 
     reading: str
+    """Name of the reading, as `MonitoringAnalytics` has it."""
     limit: float
+    """In the unit of the reading."""
 
     def __call__(self, result: object) -> bool:
         """Look at one result; True only for readings that have this one."""

@@ -6,6 +6,7 @@ import time
 from typing import ClassVar
 
 from aerodaas.analytics.base import Analytics, Context
+from aerodaas.config.checked import NotNegative
 from aerodaas.errors import ConfigError
 from aerodaas.messages.frames import Frame
 from aerodaas.messages.readings import Readings
@@ -24,7 +25,7 @@ class SyntheticAnalytics(Analytics[Readings]):
     scheduled = True
     concurrent = True
 
-    def __init__(self, name: str, edge_ms: float, cloud_ms: float) -> None:
+    def __init__(self, name: str, edge_ms: NotNegative, cloud_ms: NotNegative) -> None:
         """Set the execution times.
 
         Args:

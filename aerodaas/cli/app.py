@@ -46,7 +46,7 @@ _CORE = (
     Command(
         "schema",
         "aerodaas.cli.flying.document:schema",
-        "Print the JSON schema of environment files.",
+        "Print the JSON schema of environment files, or of mission documents.",
     ),
     Command("doctor", "aerodaas.cli.doctor:doctor", "Say what this machine can do."),
     Command(

@@ -30,10 +30,13 @@ from aerodaas.config.secrets import HIDDEN, SecretUrl, cleaned, is_secret_name, 
 from aerodaas.errors import ConfigError
 
 __all__ = [
+    "Count",
     "Extensible",
     "Finite",
+    "Fraction",
     "NotNegative",
     "Positive",
+    "PositiveFraction",
     "Settings",
     "Strict",
     "added_settings",
@@ -60,6 +63,9 @@ def is_subclass(annotation: Any, *parents: type) -> bool:  # noqa: ANN401 - any 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+PositiveFraction = Annotated[float, Field(gt=0, le=1)]
+Count = Annotated[int, Field(ge=1)]
 
 
 def _shown_settings(settings: dict[str, Any]) -> dict[str, Any]:

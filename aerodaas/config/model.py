@@ -80,6 +80,7 @@ class TaskConfig(Strict):
     """
 
     benefit: Positive = 1.0
+    """Worth of a result in time."""
     deadline: Positive = 1000.0
     """From the frame's arrival at the dispatcher."""
     edge_time: Positive | None = None
@@ -90,7 +91,9 @@ class TaskConfig(Strict):
     None: measured, 300 until then.
     """
     edge_cost: NotNegative = 0.0
+    """Cost of one execution on the edge."""
     cloud_cost: NotNegative = 0.0
+    """Cost of one execution in the cloud."""
     qoe_bonus: NotNegative = 0.0
     """Worth of a window in which enough results come in time; 0 for none."""
     qoe_share: Annotated[float, Field(gt=0, le=1)] = 0.9

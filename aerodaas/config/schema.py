@@ -14,7 +14,7 @@ from aerodaas.config.extensions import section_models
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.sections import compute, place, preflight, robot
 
-__all__ = ["environment_schema"]
+__all__ = ["attribute_texts", "environment_schema"]
 
 
 def environment_schema() -> str:
@@ -44,13 +44,14 @@ def _docstrings() -> dict[str, dict[str, str]]:
             inherited: dict[str, Any] = {}
             for base in node.bases:
                 inherited |= found.get(ast.unparse(base), {})
-            found[node.name] = inherited | _of_class(node)
+            found[node.name] = inherited | attribute_texts(node)
     for section, it in added:
         found[section.__name__] |= found[it.__name__]
     return found
 
 
-def _of_class(node: ast.ClassDef) -> dict[str, str]:
+def attribute_texts(node: ast.ClassDef) -> dict[str, str]:
+    """Docstrings of the attributes of a class, by name."""
     return {
         setting.target.id: inspect.cleandoc(text.value.value)
         for setting, text in zip(node.body, node.body[1:], strict=False)

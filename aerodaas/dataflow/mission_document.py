@@ -125,7 +125,9 @@ class SchedulerEntry(_Entry):
     """A registered scheduler and its settings."""
 
     name: Word
+    """Registered name, such as `nearest_neighbor`."""
     settings: _Settings = Field(default_factory=dict)
+    """Arguments of its constructor, by name."""
 
 
 class TriggerEntry(_Entry):
@@ -155,20 +157,24 @@ class AnalysisEntry(_Entry):
     """One analysis: by its registered name, or at the user's side."""
 
     id: ScopedWord
-    """Name of its stream."""
+    """Name of its stream: `robot/name`, with the robot of what it reads first; the name alone for
+    one that reads no robot's stream."""
     analysis: Word | None = None
+    """Registered name, such as `PersonFollowAnalytics`."""
     here: HereEntry | None = None
     """For one at the user's side, which has neither `analysis` nor settings, compute or task."""
     settings: _Settings = Field(default_factory=dict)
-    """Arguments of its constructor."""
+    """Arguments of its constructor, by name."""
     reads: list[ScopedWord] = Field(default_factory=list, max_length=_MOST)
     """Sensors by full id, and analyses; empty for a source of its own."""
     compute: ScopedWord | None = None
+    """Id of the compute resource that runs it; None for the edge beside the drone."""
     rate: Annotated[float, Field(gt=0, le=_MOST_HERTZ)] | None = None
     """Hz of a source of its own, where the application set it."""
     task: _Settings | None = None
     """Benefit and costs for the analytics scheduler, where the application set them."""
     triggers: list[TriggerEntry] = Field(default_factory=list, max_length=_MOST)
+    """What its results wake or command."""
 
     @model_validator(mode="after")
     def _is_one_kind(self) -> Self:
@@ -189,15 +195,21 @@ class NavigationDocument(_Entry):
     """Navigation of a robot: waypoints, or the stream of an analysis."""
 
     robot: Word
+    """Id of the robot."""
     stream: ScopedWord | None = None
+    """Id of the analysis that navigates it; None to fly by `waypoints`."""
     waypoints: Annotated[list[DocumentWaypoint], FailFast()] = Field(
         default_factory=list, max_length=_MOST_WAYPOINTS
     )
+    """Places to fly to, each with an id of its own."""
     ordered: bool = True
+    """Whether they are flown in the order given; otherwise the trajectory scheduler orders them."""
     priority: Annotated[int, Field(ge=0, le=LARGEST)] | None = None
+    """Priority of all of it, smaller is more urgent; None: 5, or that of each waypoint."""
     index: Annotated[int, Field(ge=0, le=_MOST_WAYPOINTS)] | None = None
+    """Number of waypoints of the same priority that it follows; None for the end."""
     deadline: Annotated[float, Field(gt=0, le=LARGEST)] | None = None
-    """Seconds of mission time."""
+    """Seconds of mission time by which all of it is to be reached; None for no deadline."""
     clear_on: ScopedWord | None = None
     """Stream whose first item empties the queue."""
 
@@ -213,7 +225,9 @@ class MissionDocument(_Entry):
     """One application's graph."""
 
     format: Literal["aerodaas-mission"]
+    """Always `aerodaas-mission`."""
     version: Literal[1]
+    """Of the format, always 1."""
     name: str = Field("", max_length=100)
     """Of the application."""
     environment: str = Field("", max_length=200)
@@ -229,7 +243,10 @@ class MissionDocument(_Entry):
     )
     """Empty for one that senses only, which a provider attaches to another flight's cameras."""
     trajectory_scheduler: SchedulerEntry | None = None
+    """Orders waypoints; None for the environment's own."""
     analytics_scheduler: Word | None = None
+    """Registered name of the scheduler that shares analyses out over edge and cloud; None for the
+    environment's own."""
 
     @model_validator(mode="after")
     def _is_bounded(self) -> Self:

@@ -15,9 +15,10 @@ import inspect
 import json
 import operator
 import re
+import textwrap
 import types
 import typing
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal, Union
 
 from pydantic import (
@@ -33,10 +34,19 @@ from pydantic import (
 from aerodaas.analytics.base import Analytics, ResourceUse
 from aerodaas.config.checked import explained
 from aerodaas.config.plugins import PluginKind, load_plugin
+from aerodaas.config.schema import attribute_texts
 from aerodaas.dataflow.interfaces import IEnvironment, INavigate
 from aerodaas.errors import GraphError, UnknownIdError
 
-__all__ = ["CONDITIONS", "SETTINGS", "argument_model", "check_arguments", "condition_adapter"]
+__all__ = [
+    "CONDITIONS",
+    "SETTINGS",
+    "AnalysisValue",
+    "argument_model",
+    "check_arguments",
+    "class_texts",
+    "condition_adapter",
+]
 
 SETTINGS = {
     "Above": "aerodaas.analytics.conditions:Above",
@@ -77,20 +87,20 @@ class AnalysisValue(_Value):
         return self
 
 
-class _ModelValue(_Value):
+class ModelFile(_Value):
     """A model file by the hash of its content, for a file has no path in a document."""
 
     name: str = Field(alias="$model", description="Name of the file.")
     sha256: str = Field(pattern="^[0-9a-f]{64}$", description="SHA-256 of the file, hexadecimal.")
 
 
-class _OutputValue(_Value):
+class OutputFolder(_Value):
     """A folder for results in the working directory of the flight."""
 
     name: str = Field(alias="$output", pattern=r"^[^/\\]+$", description="Name of the folder.")
 
 
-class _PropertyValue(_Value):
+class SensorProperty(_Value):
     """A property of a sensor of the environment file, such as the `path` of a log."""
 
     place: tuple[str, str] = Field(
@@ -98,19 +108,19 @@ class _PropertyValue(_Value):
     )
 
 
-class _DataValue(_Value):
+class EnvironmentData(_Value):
     """The environment's own data."""
 
     kind: Literal["data", "handle"] = Field(alias="$environment", description="Which form of it.")
 
 
-class _HandleValue(_Value):
+class EnvironmentHandle(_Value):
     """The environment of the flight."""
 
     kind: Literal["handle"] = Field(alias="$environment", description="Always `handle`.")
 
 
-class _NamedCondition(_Value):
+class NamedCondition(_Value):
     """A condition by name."""
 
     name: Literal[tuple(CONDITIONS)] = Field(  # type: ignore[valid-type]
@@ -119,10 +129,10 @@ class _NamedCondition(_Value):
 
 
 _RESOURCES: Mapping[ResourceUse, type[BaseModel]] = {
-    "model": _ModelValue,
-    "output": _OutputValue,
-    "input": _PropertyValue,
-    "environment": _DataValue,
+    "model": ModelFile,
+    "output": OutputFolder,
+    "input": SensorProperty,
+    "environment": EnvironmentData,
 }
 
 
@@ -253,7 +263,7 @@ def _object(kind: Any) -> Any:  # noqa: ANN401 - a class, and an annotation
     if issubclass(kind, Analytics):
         return AnalysisValue
     if issubclass(kind, (IEnvironment, INavigate)):
-        return _HandleValue
+        return EnvironmentHandle
     target = f"{kind.__module__}:{kind.__qualname__}"
     return _settings_value(kind.__name__) if target in SETTINGS.values() else None
 
@@ -264,7 +274,7 @@ def _settings_value(name: str) -> type[BaseModel]:
     module, _, attribute = SETTINGS[name].partition(":")
     kind = getattr(importlib.import_module(module), attribute)
     hints = typing.get_type_hints(kind, include_extras=True)
-    texts = _attribute_texts(kind)
+    texts = class_texts(kind)
     fields: dict[str, Any] = {}
     for one in dataclasses.fields(kind):
         missing = one.default is dataclasses.MISSING
@@ -283,21 +293,16 @@ def _settings_value(name: str) -> type[BaseModel]:
     return whole
 
 
-def _attribute_texts(kind: type) -> dict[str, str]:
-    """Docstrings of a class' attributes."""
-    body = ast.parse(inspect.cleandoc(inspect.getsource(kind))).body[0]
-    return dict(_texts(body)) if isinstance(body, ast.ClassDef) else {}
-
-
-def _texts(body: ast.ClassDef) -> Iterator[tuple[str, str]]:
-    for field, text in zip(body.body, body.body[1:], strict=False):
-        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr):
-            yield ast.unparse(field.target), " ".join(str(ast.literal_eval(text.value)).split())
+def class_texts(kind: type) -> dict[str, str]:
+    """Docstrings of a class' attributes, by name, each on one line."""
+    node = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
+    texts = attribute_texts(node) if isinstance(node, ast.ClassDef) else {}
+    return {name: " ".join(text.split()) for name, text in texts.items()}
 
 
 @functools.cache
 def condition_adapter() -> TypeAdapter[Any]:
     """Validator of a trigger's condition, as a document holds one that is not code."""
     conditions = [_settings_value(name) for name in ("Above", "Below", "Near")]
-    forms: Any = functools.reduce(operator.or_, conditions, _NamedCondition | None)
+    forms: Any = functools.reduce(operator.or_, conditions, NamedCondition | None)
     return TypeAdapter(forms)

@@ -125,10 +125,14 @@ class GraphCheck:
 
     def _streams(self, entry: AnalysisEntry) -> Iterator[Finding]:
         known = [*self._document.sensors, *self._analyses]
+        earlier = list(self._analyses)[: list(self._analyses).index(entry.id)]
         for name in entry.reads:
             # Sensors that the environment lacks have their finding.
             if name not in known:
                 yield _unknown(f"stream (that {entry.id} reads)", name, known)
+            elif name in self._analyses and name not in earlier:
+                text = f"{entry.id} reads {name}, which stands after it"
+                yield _finding(text, f"have {name} before {entry.id}")
             elif entry.id in self._kinds:
                 yield from self._carried(entry, name)
         if not entry.reads and entry.compute is None and entry.here is None:

@@ -56,7 +56,9 @@ class TargetSize:
     """Height and width of an object in metres; the height varies less than the width."""
 
     height: float
+    """Metres."""
     width: float
+    """Metres."""
     widest: float | None = None
     """Greatest width in metres, if the width depends on the viewing side, as a car's does."""
 

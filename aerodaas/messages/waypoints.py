@@ -136,6 +136,7 @@ class Waypoint:
     """
 
     id: str
+    """Its name, which no other waypoint of the robot has."""
     x: Number
     """Metres east, or latitude in degrees for a global waypoint."""
     y: Number
@@ -145,6 +146,7 @@ class Waypoint:
     hover_duration: Annotated[Number, Ge(0.0)] = 0.0
     """Seconds to stay after arrival."""
     waypoint_type: WaypointType | str = WaypointType.RELATIVE
+    """What x, y and z are counted from: `relative`, `local`, `global` or `global_relative`."""
     yaw: Number | None = None
     """Radians counter-clockwise from east on arrival; None keeps the direction of flight."""
     speed: Annotated[Number, Gt(0.0)] | None = None

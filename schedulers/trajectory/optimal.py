@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.config.checked import Positive
 from aerodaas.dataflow.interfaces import IEnvironment
 from aerodaas.errors import SchedulerError
 from aerodaas.geometry.energy import EnergyModel
@@ -46,13 +47,21 @@ class OptimalScheduler(TrajectoryScheduler):
         *,
         objective: Literal["distance", "energy"] = "distance",
         prizes: Mapping[str, float] | None = None,
-        budget: float | None = None,
+        budget: Positive | None = None,
         seed: int = 0,
     ) -> None:
-        """Minimise `objective`, in `budget` seconds (None: 9.5 ms a waypoint, up to 1.9 s).
+        """Minimise the length or the energy of the tour.
 
-        `prizes` (0 to 1e6) weighs waypoints by id where not all can be visited; 1 where not named.
-        Raises SchedulerError for settings that make no sense, and without PyVRP (on Python 3.10).
+        Args:
+            environment: The environment, whose graph records the navigation.
+            objective: `distance` or `energy`.
+            prizes: Weight of waypoints by id, 0 to 1e6, where not all can be visited; 1 where not
+                named.
+            budget: Seconds of the search; by default 9.5 ms a waypoint, up to 1.9 s.
+            seed: Of the search.
+
+        Raises:
+            SchedulerError: For settings that make no sense, and without PyVRP (on Python 3.10).
         """
         super().__init__(environment)
         require_solver("the optimal scheduler")

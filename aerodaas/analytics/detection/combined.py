@@ -29,7 +29,10 @@ class CombinedDetector(Analytics[Detections]):
     concurrent = True
 
     def __init__(self, detectors: Sequence[OnnxDetector]) -> None:
-        """Combine `detectors`, which must find different labels.
+        """Combine detectors.
+
+        Args:
+            detectors: The detectors, which must find different labels.
 
         Raises:
             ConfigError: If there is none, one is no `OnnxDetector`, or two find the same label.

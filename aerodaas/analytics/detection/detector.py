@@ -25,6 +25,7 @@ from aerodaas.analytics.detection.suppression import strongest, suppress
 from aerodaas.analytics.detection.trial import Trial, preprocessing_for, try_out
 from aerodaas.analytics.endpoint.tensors import TensorSpec
 from aerodaas.analytics.models import DETECTOR
+from aerodaas.config.checked import PositiveFraction
 from aerodaas.errors import ModelError
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Frame
@@ -69,8 +70,8 @@ class OnnxDetector(Analytics[Detections]):
         path: str | Path = DETECTOR,
         *,
         classes: Sequence[str] | None = None,
-        min_score: float = 0.3,
-        iou: float = 0.6,
+        min_score: PositiveFraction = 0.3,
+        iou: PositiveFraction = 0.6,
         names: Sequence[str] | None = None,
         size: int | None = None,
         providers: Sequence[str] | None = None,

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.clock import seconds
+from aerodaas.config.checked import Count, NotNegative
 from aerodaas.geometry.frames import Box, rotation_from_rpy
 from aerodaas.messages.appearance import unlikeness
 from aerodaas.messages.detections import Detection, Detections
@@ -289,7 +290,7 @@ class TrackingAnalytics(Analytics[Detections]):
     accepts: ClassVar[tuple[type, ...]] = (Detections,)
     produces: ClassVar[type] = Detections
 
-    def __init__(self, *, max_age: float = 1.0, min_hits: int = 2) -> None:
+    def __init__(self, *, max_age: NotNegative = 1.0, min_hits: Count = 2) -> None:
         """Configure the tracker.
 
         Args:

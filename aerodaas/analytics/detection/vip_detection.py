@@ -9,6 +9,7 @@ from typing import ClassVar
 from aerodaas.analytics.base import ResourceUse
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.models import DETECTOR
+from aerodaas.config.checked import PositiveFraction
 
 __all__ = ["VipDetectionAnalytics"]
 
@@ -26,8 +27,8 @@ class VipDetectionAnalytics(OnnxDetector):
         model: str | Path | None = None,
         *,
         classes: Sequence[str] | None = None,
-        min_score: float = 0.3,
-        iou: float = 0.45,
+        min_score: PositiveFraction = 0.3,
+        iou: PositiveFraction = 0.45,
         providers: Sequence[str] | None = None,
         threads: int | None = None,
     ) -> None:

@@ -19,6 +19,7 @@ from aerodaas.analytics.follow.identity import Certainty, TargetIdentity
 from aerodaas.analytics.follow.observation import observation
 from aerodaas.analytics.people.debounce import Debounce
 from aerodaas.clock import seconds
+from aerodaas.config.checked import Positive
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import ConfigError
 from aerodaas.following.follow_controller import LYING, FollowController, FollowPhase
@@ -92,11 +93,11 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
     def __init__(
         self,
         labels: Sequence[str] = ("person",),
-        distance: float = 2.0,
-        height: float = 1.5,
+        distance: Positive = 2.0,
+        height: Positive = 1.5,
         *,
-        target_height: float = 1.7,
-        target_width: float = 0.55,
+        target_height: Positive = 1.7,
+        target_width: Positive = 0.55,
         priority: int = DEFAULT_PRIORITY,
         gains: FollowGains | None = None,
         limits: FollowLimits | None = None,

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.follow.analytics import FollowAnalytics
+from aerodaas.config.checked import Positive
 from aerodaas.dataflow.interfaces import IEnvironment
 from aerodaas.following.follow_settings import FollowGains, FollowLimits, LostPolicy, TargetChoice
 from aerodaas.following.target import TargetMotion, TargetSize
@@ -30,11 +31,11 @@ class VipFollowAnalytics(FollowAnalytics):
         self,
         environment: IEnvironment | None = None,
         *,
-        distance: float = 2.0,
-        height: float = 1.5,
+        distance: Positive = 2.0,
+        height: Positive = 1.5,
         labels: Sequence[str] = ("vest", "hazard vest"),
-        target_height: float = 0.6,
-        target_width: float = 0.43,
+        target_height: Positive = 0.6,
+        target_width: Positive = 0.43,
         gains: FollowGains | None = None,
         limits: FollowLimits | None = None,
         lost: LostPolicy | None = None,
@@ -91,12 +92,12 @@ class CarFollowAnalytics(FollowAnalytics):
         self,
         environment: IEnvironment | None = None,
         *,
-        distance: float = 6.0,
-        height: float = 2.5,
+        distance: Positive = 6.0,
+        height: Positive = 2.5,
         labels: Sequence[str] = ("car",),
-        target_height: float = 1.5,
-        target_width: float = 1.8,
-        target_length: float = 4.2,
+        target_height: Positive = 1.5,
+        target_width: Positive = 1.8,
+        target_length: Positive = 4.2,
         area: Sequence[tuple[float, float]] | None = None,
         gains: FollowGains | None = None,
         limits: FollowLimits | None = None,

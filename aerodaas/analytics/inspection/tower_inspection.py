@@ -14,6 +14,7 @@ import numpy as np
 from aerodaas.analytics.base import Context, NavigableAnalytics, ResourceUse
 from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.follow.observation import observation
+from aerodaas.config.checked import Fraction, Positive
 from aerodaas.dataflow.graph import AeroStreamData, Trigger
 from aerodaas.dataflow.interfaces import IEnvironment
 from aerodaas.dataflow.navigation import AeroNavigation
@@ -59,16 +60,16 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
         self,
         environment: IEnvironment | None = None,
         *,
-        stand_off: float = 8.0,
-        base: float = 2.0,
-        top: float = 35.0,
-        interval: float = 2.0,
-        speed: float = 1.5,
-        climb: float = 1.0,
-        patience: float = 20.0,
-        longest: float = 600.0,
-        width: float = 3.0,
-        sure: float = 0.5,
+        stand_off: Positive = 8.0,
+        base: Positive = 2.0,
+        top: Positive = 35.0,
+        interval: Positive = 2.0,
+        speed: Positive = 1.5,
+        climb: Positive = 1.0,
+        patience: Positive = 20.0,
+        longest: Positive = 600.0,
+        width: Positive = 3.0,
+        sure: Fraction = 0.5,
         labels: Sequence[str] = ("tower",),
         lands: bool = True,
         pictures: str | Path | None = None,

@@ -10,6 +10,7 @@ import numpy as np
 
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.clock import seconds
+from aerodaas.config.checked import Fraction, NotNegative
 from aerodaas.dataflow.interfaces import IMonitoringAnalytics
 from aerodaas.errors import UnknownIdError
 from aerodaas.messages.frames import Frame, Header
@@ -46,9 +47,9 @@ class MonitoringAnalytics(Analytics[Readings], IMonitoringAnalytics[Readings]):
         self,
         readings: Sequence[str] = ("battery", "height", "gps"),
         *,
-        battery_low: float = 0.25,
+        battery_low: Fraction = 0.25,
         max_height: float = math.inf,
-        patience: float = 2.0,
+        patience: NotNegative = 2.0,
     ) -> None:
         """Select readings and the limits of the alerts.
 

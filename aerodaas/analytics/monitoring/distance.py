@@ -9,6 +9,7 @@ from typing import ClassVar
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.people.debounce import Debounce
+from aerodaas.config.checked import Count, Positive
 from aerodaas.errors import ConfigError
 from aerodaas.following.target import RelativeTarget, TargetSize, sight
 from aerodaas.messages.detections import Detections
@@ -38,10 +39,10 @@ class DistanceAnalytics(BoxAnalytics[Readings]):
     def __init__(
         self,
         *,
-        limit: float = 1.5,
+        limit: Positive = 1.5,
         sizes: Mapping[str, TargetSize | tuple[float, float]] | None = None,
-        needed: int = 2,
-        of: int = 3,
+        needed: Count = 2,
+        of: Count = 3,
         detector: BoxAnalytics.Detector | None = None,
     ) -> None:
         """Alert when `needed` of the last `of` frames show an object within `limit`.

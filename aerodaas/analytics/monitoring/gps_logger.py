@@ -20,6 +20,7 @@ from xml.etree import ElementTree as ET
 
 from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.clock import seconds
+from aerodaas.config.checked import Positive
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.http_client import http_client, http_errors, read_at_most
 from aerodaas.messages.frames import Header
@@ -245,10 +246,10 @@ class GpsLoggerAnalytics(Analytics[GpsFix]):
         self,
         source: str | Path,
         *,
-        rate: float = 1.0,
+        rate: Positive = 1.0,
         offset: float = 0.0,
-        max_age: float = 10.0,
-        timeout: float = 2.0,
+        max_age: Positive = 10.0,
+        timeout: Positive = 2.0,
     ) -> None:
         """Read a file, which is copied to where it runs; a feed is first polled in flight.
 

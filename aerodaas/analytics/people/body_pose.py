@@ -20,6 +20,7 @@ from aerodaas.analytics.people.gestures import GESTURE_MODEL, GestureClassifier
 from aerodaas.analytics.people.joints import ARMS, FACE, HIPS, POINTS, SHOULDERS, visible
 from aerodaas.analytics.people.lying import lies
 from aerodaas.clock import seconds
+from aerodaas.config.checked import Count, Fraction, NotNegative
 from aerodaas.config.model import RuntimeEnvConfig
 from aerodaas.dataflow.graph import AeroStreamData, Trigger
 from aerodaas.dataflow.interfaces import ICompute, IEnvironment
@@ -139,13 +140,13 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         self,
         environment: IEnvironment | None = None,
         *,
-        needed: int = 4,
-        of: int = 6,
-        hold: float = 0.5,
+        needed: Count = 4,
+        of: Count = 6,
+        hold: NotNegative = 0.5,
         lands: bool = True,
         vest_labels: Sequence[str] = ("vest", "hazard vest"),
-        min_probability: float = 0.6,
-        min_confidence: float = 0.35,
+        min_probability: Fraction = 0.6,
+        min_confidence: Fraction = 0.35,
         gestures: str | Path = GESTURE_MODEL,
         detector: Detector | None = None,
     ) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.people.debounce import Debounce
+from aerodaas.config.checked import Count, Positive
 from aerodaas.errors import ConfigError
 from aerodaas.following.ground_point import GroundView
 from aerodaas.messages.detections import Detections
@@ -40,11 +41,11 @@ class CrowdDensityAnalytics(BoxAnalytics[Readings]):
     def __init__(
         self,
         *,
-        limit: float = 2.0,
-        farthest: float = 30.0,
+        limit: Positive = 2.0,
+        farthest: Positive = 30.0,
         labels: Sequence[str] = ("person",),
-        needed: int = 3,
-        of: int = 5,
+        needed: Count = 3,
+        of: Count = 5,
         detector: BoxAnalytics.Detector | None = None,
     ) -> None:
         """Alert when `needed` of the last `of` frames show a peak density above `limit`.

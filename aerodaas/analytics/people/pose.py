@@ -13,6 +13,7 @@ from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.detection.keypoints import KeypointModel
 from aerodaas.analytics.models import POSE
+from aerodaas.config.checked import Count, PositiveFraction
 from aerodaas.errors import ConfigError
 from aerodaas.geometry.frames import Box
 from aerodaas.messages.detections import Detection, Detections
@@ -63,8 +64,8 @@ class PoseAnalytics(Analytics[Detections]):
         model: str | Path = POSE,
         *,
         detector: OnnxDetector | None = None,
-        most: int = 5,
-        min_score: float = 0.3,
+        most: Count = 5,
+        min_score: PositiveFraction = 0.3,
         providers: Sequence[str] | None = None,
         threads: int | None = None,
     ) -> None:

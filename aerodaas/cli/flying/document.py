@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -64,12 +65,25 @@ def _drawing(application: Path, words: list[str], env: Path | None) -> str:
     return mermaid(build_application(application, words, options).graph)
 
 
-def schema() -> None:
-    """Print the JSON schema of environment files.
+def schema(
+    document: Annotated[  # noqa: FBT002
+        bool, typer.Option("--document", help="Of mission documents instead.")
+    ] = False,
+) -> None:
+    """Print the JSON schema of environment files, or of mission documents.
 
-    aerodaas schema > environment.schema.json
+    An editor completes a file by it. That of mission documents describes the arguments of each
+    analysis and scheduler that is installed here, so that a program can write a document by it.
+
+        aerodaas schema > environment.schema.json
+        aerodaas schema --document > mission.schema.json
     """
-    from aerodaas.config.schema import environment_schema  # noqa: PLC0415 - slow to load
+    if document:
+        from aerodaas.documents.schema import document_schema  # noqa: PLC0415 - slow to load
+
+        typer.echo(json.dumps(document_schema(), indent=2))
+        return
+    from aerodaas.config.schema import environment_schema  # noqa: PLC0415 - as above
 
     typer.echo(environment_schema(), nl=False)
 

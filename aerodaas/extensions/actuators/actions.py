@@ -24,6 +24,7 @@ class MoveActuator(Action):
     actuator: str
     """Its id in the environment file."""
     position: str
+    """Name of one of its positions in the environment file, such as `open`."""
     type: Literal["move_actuator"] = field(default="move_actuator", repr=False)
 
     def __post_init__(self) -> None:

@@ -74,9 +74,11 @@ class LookAt(Action):
     keywords: ClassVar[tuple[str, ...]] = ("look_at",)
     stops: ClassVar[bool] = False
     x: Number
-    """Counted as the waypoint's own, as y and z are."""
+    """East or latitude, counted as the waypoint's own x is."""
     y: Number
+    """North or longitude, counted as the waypoint's own y is."""
     z: Number
+    """Height in metres, counted as the waypoint's own z is."""
     type: Literal["look_at"] = field(default="look_at", repr=False)
 
     @classmethod
