@@ -164,7 +164,7 @@ class RemoteConfig(Strict):
 class SimulationConfig(Strict):
     """The world of the simulated drones."""
 
-    world: str = "field"
+    world: str = "empty"
     """A world's registered name, or the path of a scenario file."""
     seed: Annotated[int, Field(ge=0)] = 0
     wind: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)

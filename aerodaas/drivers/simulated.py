@@ -29,6 +29,8 @@ from aerodaas.messages.vehicle import (
 from aerodaas.simulation.actuators import SimulatedActuators
 from aerodaas.simulation.airframe import Airframe, Wind
 from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
+from aerodaas.simulation.collision import Obstacles
+from aerodaas.simulation.contact import Contacts
 from aerodaas.simulation.dynamics import STEP, STEP_NS, Multirotor
 from aerodaas.simulation.equipment import simulated_equipment
 from aerodaas.simulation.sensors import SensorNoise, SimulatedRangefinder, Surface
@@ -46,7 +48,8 @@ class SimulatedVehicle:
 
     Time moves only in `advance_to`, on a fixed grid, so that the trajectory depends on the seed
     and the commands alone, not on how the caller slices time. One thread at a time may use it.
-    Raises ConfigError if the robot's settings are not those of an `Airframe`.
+    Raises ConfigError if the robot's settings are not those of an `Airframe`, and for a world that
+    cannot be read.
     """
 
     settings_model = Airframe
@@ -80,9 +83,12 @@ class SimulatedVehicle:
             terrain=None if terrain is None else terrain.height,
         )
         self._noise = SensorNoise(simulation.sensor_noise, f"{simulation.seed}/{robot.id}/noise")
-        self._autopilot = Autopilot(airframe, self._rotor, self._noise, self._limits)
+        world = World.load(simulation)
+        obstacles = Obstacles(world)
+        contacts = Contacts(obstacles, self._rotor) if obstacles else None
+        self._autopilot = Autopilot(airframe, self._rotor, self._noise, self._limits, contacts)
         self._measures_ground = limits.rangefinder_clearance > 0.0
-        self._rangefinder = _rangefinder(robot, environment, airframe, terrain)
+        self._rangefinder = _rangefinder(robot, environment, airframe, terrain, world)
         self._now = 0
         self._steps = 0
         self._connected = False
@@ -171,8 +177,8 @@ class SimulatedVehicle:
 
     def _faults(self) -> list[str]:
         faults = []
-        if self._autopilot.crashed:
-            faults.append(f"crashed: hit the ground at {self._rotor.impact:.1f} m/s")
+        if self._autopilot.collision is not None:
+            faults.append(str(self._autopilot.collision))
         left, airframe = self._autopilot.battery.fraction, self._airframe
         if left <= 0.0:
             faults.append("the battery is empty")
@@ -200,7 +206,7 @@ class SimulatedVehicle:
             reasons.append("not connected")
         if self._autopilot.flying:
             reasons.append(f"already {self._autopilot.mode.value.replace('_', ' ')}")
-        if self._autopilot.crashed:
+        if self._autopilot.collision is not None:
             reasons.append("crashed")
         if self._measures_ground and self._rangefinder is None:
             reasons.append(
@@ -299,7 +305,11 @@ def _terrain(robot: RobotConfig, environment: EnvironmentConfig) -> Ground | Non
 
 
 def _rangefinder(
-    robot: RobotConfig, environment: EnvironmentConfig, airframe: Airframe, terrain: Ground | None
+    robot: RobotConfig,
+    environment: EnvironmentConfig,
+    airframe: Airframe,
+    terrain: Ground | None,
+    world: World,
 ) -> SimulatedRangefinder | None:
     """Its rangefinder; None without one, and where the robot's limits need none."""
     if airframe.rangefinder is None or robot.limits.rangefinder_clearance <= 0.0:
@@ -307,9 +317,7 @@ def _rangefinder(
     simulation = environment.simulation
     return SimulatedRangefinder(
         airframe.rangefinder,
-        Surface(
-            World.load(simulation), robot.start[2], None if terrain is None else terrain.heights
-        ),
+        Surface(world, robot.start[2], None if terrain is None else terrain.heights),
         simulation.sensor_noise,
         f"{simulation.seed}/{robot.id}/rangefinder",
     )

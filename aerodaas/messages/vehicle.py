@@ -19,6 +19,7 @@ from aerodaas.messages.serialization.json_types import Int64, Real
 from aerodaas.messages.serialization.records import UNSENT, fast_pickle
 
 __all__ = [
+    "COLLISION",
     "Capabilities",
     "ClockedVehicle",
     "FlightEnd",
@@ -79,6 +80,10 @@ class Traffic:
     def knows_height(self) -> bool:
         """Whether its height is known."""
         return math.isfinite(self.position[2])
+
+
+COLLISION = "collision"
+"""First word of a vehicle's fault about a collision; it goes on with what, where and how fast."""
 
 
 class FlightEnd(str, enum.Enum):

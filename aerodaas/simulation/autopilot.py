@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from aerodaas.messages.vehicle import FlightEnd, VehicleMode
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.battery import FlightBattery, flight_power
+from aerodaas.simulation.contact import Collision, Contacts
 from aerodaas.simulation.dynamics import (
     STEP,
     Multirotor,
@@ -41,7 +42,7 @@ _FLARE_SPEED_PER_METRE = 0.5
 """Descent speed per metre of height above the ground, 1/s."""
 
 _CRASH_SPEED = 2.0
-"""Downward speed in m/s at touchdown above which a crash is reported."""
+"""Downward speed in m/s at touchdown above which it is a collision with the ground."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,11 +87,13 @@ class Autopilot:
         rotor: Multirotor,
         noise: SensorNoise,
         limits: FlightLimits,
+        contacts: Contacts | None = None,
     ) -> None:
-        """Start on the ground, disarmed."""
+        """Start on the ground, disarmed; `contacts` with the world, None for an empty one."""
         self.mode = VehicleMode.GROUNDED
         self.armed = False
-        self.crashed = False
+        self.collision: Collision | None = None
+        """The first one; from then on its motors stand still."""
         self.ended: FlightEnd | None = None
         """End of the latest flight; None before and during one."""
         self.battery = FlightBattery(airframe)
@@ -98,6 +101,7 @@ class Autopilot:
         self._rotor = rotor
         self._noise = noise
         self._limits = limits
+        self._contacts = contacts
         self._home = rotor.position
         self._target: Goto | Steer | None = None
         self._steps = 0
@@ -146,13 +150,18 @@ class Autopilot:
 
     def step(self) -> None:
         """Advance by one step of the flight dynamics."""
-        rotor = self._rotor
-        if self.armed and self.battery.fraction > 0.0:
+        rotor, before = self._rotor, self._rotor.position
+        powered = self.armed and self.battery.fraction > 0.0
+        if powered:
             demand, yaw_rate = self._velocity_setpoint()
             rotor.step(demand, yaw_rate)
         else:
             rotor.step(None, 0.0)
         self._steps += 1
+        if self._contacts is not None:
+            collision = self._contacts.step(before, self._steps * STEP, powered=powered)
+            if collision is not None and self.flying:
+                self._collide(collision)
         if self._steps % SensorNoise.PERIOD == 0:
             self._noise.update()
         if self._steps % _POWER_PERIOD == 0:
@@ -160,6 +169,13 @@ class Autopilot:
             self.battery.drain(power, STEP * _POWER_PERIOD)
         if self.armed:
             self._change_mode()
+        elif self.flying and rotor.on_ground:
+            self._change_mode_on_ground()
+
+    def _collide(self, collision: Collision) -> None:
+        """Stop the motors; the drone falls."""
+        self.collision = self.collision or collision
+        self.armed = False
 
     def _believed(self) -> Triple:
         (x, y, z), (dx, dy, dz) = self._rotor.position, self._noise.drift
@@ -228,16 +244,16 @@ class Autopilot:
         )
 
     def _change_mode_on_ground(self) -> None:
-        if self.mode is VehicleMode.TAKING_OFF:
+        if self.mode is VehicleMode.TAKING_OFF and self.collision is None:
             return
         self._grounded_for += STEP
         landing = self.mode in {VehicleMode.LANDING, VehicleMode.FAILSAFE}
         if self._rotor.impact > _CRASH_SPEED:
-            self.crashed = True
+            self._collide(Collision("the ground", self._rotor.position, self._rotor.impact))
         patience = _DISARM_AFTER if landing else _DISARM_GUIDED_AFTER
-        if self.crashed or self._grounded_for >= patience:
+        if self.collision or self._grounded_for >= patience:
             self.armed = False
             self.mode = VehicleMode.GROUNDED
             self._target = None
             if self._lifted:
-                self.ended = FlightEnd.FELL if self.crashed else FlightEnd.LANDED
+                self.ended = FlightEnd.FELL if self.collision else FlightEnd.LANDED

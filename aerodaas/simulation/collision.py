@@ -84,9 +84,11 @@ class _Body:
         """Distance from a point, and the nearest place of the body, ENU metres."""
         dx, dy = point[0] - self.x, point[1] - self.y
         c, s = self.cosine, self.sine
-        along, across, up = self.shape(c * dx + s * dy, c * dy - s * dx, point[2])
+        own = c * dx + s * dy, c * dy - s * dx, point[2]
+        along, across, up = found = self.shape(*own)
         place = self.x + c * along - s * across, self.y + s * along + c * across, up
-        return math.dist(point, place), place
+        # Of own places, so that it is 0 within, whatever turning rounds.
+        return math.dist(own, found), place
 
 
 class Obstacles:
@@ -101,7 +103,8 @@ class Obstacles:
                 self._moving.append(thing)
             else:
                 self._bodies += _bodies(thing, 0.0)
-        self._fastest = max(map(_pace, self._moving), default=0.0)
+        self.fastest = max(map(_pace, self._moving), default=0.0)
+        """Greatest speed of a person or car along its way, m/s."""
         table = np.array(
             [(one.x, one.y, one.reach, one.bottom, one.top) for one in self._bodies]
         ).reshape(-1, 5)
@@ -138,7 +141,7 @@ class Obstacles:
             ignored: Ids of objects that do not count.
         """
         place, moment, free, without = self._latest
-        moved = math.dist(point, place) + self._fastest * abs(time - moment)
+        moved = math.dist(point, place) + self.fastest * abs(time - moment)
         if free - moved >= reach and without == ignored:
             return None
         found, free = self._search(point, time, ignored)

@@ -161,7 +161,7 @@ class Multirotor:
         self._wind.step()
         if demand is None:
             if self.on_ground:
-                self._rest()
+                self._stop()
                 return
             command = (0.0, 0.0, 0.0)
         else:
@@ -184,7 +184,12 @@ class Multirotor:
         )
         self._move((fx + dx, fy + dy, fz - GRAVITY + dz), yaw_rate)
 
-    def _rest(self) -> None:
+    def rest(self) -> None:
+        """Stand where it is."""
+        self.on_ground = True
+        self._stop()
+
+    def _stop(self) -> None:
         self.velocity = self.acceleration = self.thrust = (0.0, 0.0, 0.0)
         self._disturbance = (0.0, 0.0, 0.0)
         self.yaw_rate = 0.0

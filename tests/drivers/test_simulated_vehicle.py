@@ -188,7 +188,7 @@ def test_an_empty_battery_falls_down() -> None:
     flight = Flight(settings_)
     flight.vehicle.take_off(20.0)
     state = flight.until(VehicleMode.GROUNDED)
-    assert any("hit the ground" in fault for fault in state.faults)
+    assert any("collision with the ground" in fault for fault in state.faults)
     assert state.ended is FlightEnd.FELL
     assert "crashed" in flight.vehicle.preflight()
 

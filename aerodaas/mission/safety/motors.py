@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from aerodaas.clock import NANOSECONDS
 from aerodaas.geometry.frames import Vector
 from aerodaas.messages.mission import MissionState
-from aerodaas.messages.vehicle import FlightEnd, VehicleMode, VehicleState
+from aerodaas.messages.vehicle import COLLISION, FlightEnd, VehicleMode, VehicleState
 from aerodaas.mission.safety.supervisor import has_position
 
 __all__ = ["MotorWatch", "Motors", "MotorsOffRule"]
@@ -138,6 +138,9 @@ class MotorWatch:
         if motors is Motors.LANDED:
             why = f": {'; '.join(faults)}" if faults else ""
             return "landed", f"landed of its own accord {where}{why}"
+        for fault in faults:
+            if fault.startswith(COLLISION):
+                return COLLISION, fault
         return "motors_stopped", f"motors stopped in flight {where}"
 
     def _run(self, state: VehicleState, now: int) -> None:

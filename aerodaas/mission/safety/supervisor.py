@@ -13,7 +13,7 @@ from aerodaas.config.extensions import added
 from aerodaas.config.model import LimitsConfig
 from aerodaas.geometry.energy import EnergyMeter
 from aerodaas.geometry.frames import Vector, is_finite, length
-from aerodaas.messages.vehicle import VehicleMode, VehicleState
+from aerodaas.messages.vehicle import COLLISION, VehicleMode, VehicleState
 from aerodaas.mission.log import subject
 from aerodaas.mission.safety.failsafe import FailsafeAction, Fault
 from aerodaas.mission.safety.geofence import Geofence
@@ -149,7 +149,7 @@ class Supervisor:
             self._taken = pilot
         for rule in self._rules:
             findings += rule.assess(state, now)
-        findings += [Fault(FailsafeAction.NOTHING, "vehicle", text) for text in state.faults]
+        findings += [Fault(FailsafeAction.NOTHING, _kind(text), text) for text in state.faults]
         if not findings:
             return CALM
         return Assessment(max(findings, key=lambda finding: finding.demand), tuple(findings))
@@ -320,6 +320,10 @@ class Supervisor:
         slack = np.array([0.0, 0.0, _SLACK])
         objection = self._clearance.objection(position + slack)
         return Fault(FailsafeAction.NOTHING, "ground", objection) if objection else None
+
+
+def _kind(fault: str) -> str:
+    return COLLISION if fault.startswith(COLLISION) else "vehicle"
 
 
 def charge_objection(state: VehicleState, limits: LimitsConfig) -> str:

@@ -77,7 +77,7 @@ def test_it_crashes_into_a_hill(tmp_path: Path) -> None:
     state = flight.until(VehicleMode.GROUNDED)
     assert state.ended is FlightEnd.FELL
     assert state.odometry.position[0] == pytest.approx(20.0, abs=16.0)
-    assert any("crashed" in fault for fault in state.faults)
+    assert any("collision with the ground" in fault for fault in state.faults)
 
 
 def test_the_ground_does_not_depend_on_how_time_is_sliced(tmp_path: Path) -> None:
