@@ -121,6 +121,7 @@ OTHERS = {
     "lab_vs_live": ("python benchmarks/lab_vs_live.py", "judges the lab by flights"),
     "edge_and_cloud": ("python benchmarks/edge_and_cloud.py", "judges flights"),
     "paper": ("python benchmarks/paper.py --seeds 20", "judges flights over many seeds"),
+    "agents": ("python benchmarks/agents.py", "judges flights of scripted answers"),
     "following": ("python benchmarks/following.py", "judges flights over many seeds"),
     "meetings": ("python benchmarks/meetings.py --seeds 20", "judges flights over many seeds"),
     "crossings": ("python benchmarks/crossings.py --seeds 20", "judges flights over many seeds"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +12,8 @@ from aerodaas.clock import seconds
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.recording.reader import Recording, vehicle_states
 from aerodaas.recording.report.flight import Band, RecordedFlight, RobotFlight
-from aerodaas.simulation.scenario import Car, Gesture
-from aerodaas.simulation.world import CAR_SIZE, World
+from aerodaas.simulation.scenario import Building, Car, Gesture
+from aerodaas.simulation.world import World
 
 __all__ = ["Evidence"]
 
@@ -35,6 +35,8 @@ class Evidence:
     """True ENU metres, shape (N, 3)."""
     velocity: NDArray[np.float64]
     """True ENU m/s, shape (N, 3)."""
+    yaw: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    """True radians counter-clockwise from east, shape (N,); empty where nobody recorded it."""
 
     @classmethod
     def read(cls, path: Path, robot: str | None = None) -> Evidence:
@@ -45,11 +47,11 @@ class Evidence:
             environment = EnvironmentConfig.model_validate_json(content)
             config = next(one for one in environment.robots if robot in {None, one.id})
             rows = [
-                (seconds(state.stamp), *odometry.position, *odometry.velocity)
+                (seconds(state.stamp), *odometry.position, *odometry.velocity, odometry.yaw)
                 for _, state in vehicle_states(recording, config.id)
                 for odometry in [state.truth or state.odometry]
             ]
-        table = np.array(rows, dtype=np.float64).reshape(-1, 7)
+        table = np.array(rows, dtype=np.float64).reshape(-1, 8)
         return cls(
             flight,
             flight.robots[config.id],
@@ -58,6 +60,7 @@ class Evidence:
             table[:, 0],
             table[:, 1:4],
             table[:, 4:7],
+            table[:, 7],
         )
 
     @property
@@ -96,17 +99,17 @@ class Evidence:
     def to_thing(self, name: str) -> NDArray[np.float64]:
         """Level metres from the drone to a thing of the world, at all times, shape (N,).
 
-        To the middle of a person or a tower, and to the nearest point of a car.
+        To the middle of a person or a tower, and to the nearest point of a car or a building.
         """
         thing = self.world.thing(name)
         states = [thing.state(float(time)) for time in self.time]
         way = self.position[:, :2] - np.array([(state.x, state.y) for state in states])
-        if not isinstance(thing.spec, Car):
+        if not isinstance(thing.spec, Car | Building):
             return np.asarray(np.linalg.norm(way, axis=1))
         yaw = np.array([state.yaw for state in states])
         along = np.cos(yaw) * way[:, 0] + np.sin(yaw) * way[:, 1]
         across = np.cos(yaw) * way[:, 1] - np.sin(yaw) * way[:, 0]
-        beyond = np.abs(np.stack([along, across], -1)) - np.array(CAR_SIZE[:2]) / 2
+        beyond = np.abs(np.stack([along, across], -1)) - np.array(thing.boxes(0.0)[0].size[:2]) / 2
         return np.asarray(np.linalg.norm(np.clip(beyond, 0.0, None), axis=1))
 
     def gesture(self, name: str, kind: str) -> Gesture:

@@ -1,0 +1,1 @@
+"""Tasks that an agent is asked in words, judged by geometry; no model is needed."""
