@@ -26,7 +26,6 @@ from aerodaas.messages.vehicle import (
     VehicleState,
     VelocitySetpoint,
 )
-from aerodaas.simulation.actuators import SimulatedActuators
 from aerodaas.simulation.airframe import Airframe, Wind
 from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
 from aerodaas.simulation.collision import Obstacles
@@ -44,7 +43,7 @@ _EXACT = SensorNoise(0.0, "")
 
 
 class SimulatedVehicle:
-    """A quadrotor in the embedded simulator: `SteppedVehicle`, `ActuatedVehicle`.
+    """A quadrotor in the embedded simulator; a `SteppedVehicle`.
 
     Time moves only in `advance_to`, on a fixed grid, so that the trajectory depends on the seed
     and the commands alone, not on how the caller slices time. One thread at a time may use it.
@@ -92,14 +91,8 @@ class SimulatedVehicle:
         self._now = 0
         self._steps = 0
         self._connected = False
-        self._actuators = SimulatedActuators(robot.actuators, self._descend)
         self.equipment = simulated_equipment(robot, environment, self._descend)
         """What extensions bring."""
-
-    @property
-    def actuators(self) -> SimulatedActuators:
-        """Actuators that the environment file names."""
-        return self._actuators
 
     def _descend(self) -> None:
         """Come down where it is, whatever anybody asks."""
@@ -149,7 +142,6 @@ class SimulatedVehicle:
         for _ in range(stamp // STEP_NS - self._steps):
             step()
         self._steps = stamp // STEP_NS
-        self._actuators.advance_to(stamp)
         for one in self.equipment:
             one.advance_to(stamp)
 
@@ -169,7 +161,6 @@ class SimulatedVehicle:
             tuple(self._faults()),
             ended=self._autopilot.ended,
             below=finder.below(motion, self._now) if finder is not None else None,
-            actuators=dict(self._actuators.positions),
         )
         for one in self.equipment:
             state = one.complete(state)

@@ -46,7 +46,11 @@ class SimulatedEquipment:
 
 
 def simulated_equipment(
-    robot: RobotConfig, environment: EnvironmentConfig, descend: Callable[[], None]
+    robot: RobotConfig,
+    environment: EnvironmentConfig,
+    descend: Callable[[], None],
+    *,
+    replayed: bool = False,
 ) -> list[SimulatedEquipment]:
     """The equipment that extensions bring for a drone.
 
@@ -54,5 +58,10 @@ def simulated_equipment(
         robot: The drone's section of the environment file.
         environment: The whole file.
         descend: Has the drone come down where it is, whatever anybody asks.
+        replayed: Whether only that is meant which a recorded vehicle has, too.
     """
-    return [kind(robot, environment, descend) for kind in added("simulated_equipment")]
+    return [
+        kind(robot, environment, descend)
+        for kind in added("simulated_equipment")
+        if kind.replays or not replayed
+    ]

@@ -28,7 +28,6 @@ from aerodaas.drivers.mavlink.control.departure import Departure
 from aerodaas.drivers.mavlink.control.mode_change import ModeChange, flight_objection
 from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.control.watchdog import Watchdog
-from aerodaas.drivers.mavlink.microservices.actuators import MavlinkActuators
 from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.mission_mode import MavlinkMissionMode
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
@@ -56,7 +55,7 @@ _PARTING = 4.0
 
 
 class MavlinkVehicle:
-    """One multicopter with PX4 or ArduPilot; `ClockedVehicle`, `ActuatedVehicle`.
+    """One multicopter with PX4 or ArduPilot; a `ClockedVehicle`.
 
     One thread at a time may use it, except the link's own. Raises ConfigError for unknown settings.
     """
@@ -110,7 +109,6 @@ class MavlinkVehicle:
         self._modes: ModeChange | None = None
         self.mission_mode: MavlinkMissionMode | None = None
         """Its own mission mode; None before it is connected."""
-        self._actuators = MavlinkActuators(self._robot.actuators, self._settings, self._lock)
         self._completion = ClimbCompletion(self._telemetry, self._phase)
         self._checked_at = -math.inf
         self._told: VehicleMode | None = None
@@ -123,9 +121,6 @@ class MavlinkVehicle:
             "GLOBAL_POSITION_INT": self._on_global_position,
             "EXTENDED_SYS_STATE": self._on_landed_state,
             **dict.fromkeys(MavlinkMissionMode.messages, self._on_mission_message),
-            **dict.fromkeys(
-                MavlinkActuators.messages, lambda message, _: self._actuators.on_message(message)
-            ),
         }
         """Handlers of the autopilot's messages by their name, after the telemetry."""
         for component in self.equipment:
@@ -228,7 +223,6 @@ class MavlinkVehicle:
                 modes=self._modes,
                 lock=self._lock,
             )
-            self._actuators.use(commander)
         except BaseException:
             self.close()
             raise
@@ -291,14 +285,7 @@ class MavlinkVehicle:
         self._watchdog.feed()
         with self._lock:
             link, now = self._connected().link, time.monotonic()
-            state = self._report.state(self._clock.now(), now, link.counts, link.reports(now))
-            state.actuators.update(self._actuators.positions)
-            return state
-
-    @property
-    def actuators(self) -> MavlinkActuators:
-        """Actuators that the environment file names."""
-        return self._actuators
+            return self._report.state(self._clock.now(), now, link.counts, link.reports(now))
 
     @property
     def sea_level(self) -> float | None:
@@ -577,7 +564,6 @@ class MavlinkVehicle:
             self._touchdown.update(now)
             for component in self.equipment:
                 component.step(now)
-            self._actuators.step(now)
             if self.mission_mode is not None:
                 self.mission_mode.step(now)
             if self._connection is not None:

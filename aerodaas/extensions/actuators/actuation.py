@@ -17,12 +17,13 @@ from aerodaas.config.sections.actuators import RelayConfig, ServoConfig
 from aerodaas.config.sections.robot import RobotConfig
 from aerodaas.errors import VehicleError, failure_line
 from aerodaas.extensions.actuators.actions import MoveActuator
+from aerodaas.extensions.actuators.equipment import Actuators, MoveResult
 from aerodaas.extensions.actuators.objections import command_objection, waypoint_objection
 from aerodaas.extensions.actuators.settings import ActuatorMission
 from aerodaas.geometry.frames import Vector, length
-from aerodaas.messages.actuators import ActuatedVehicle, Actuators, MoveResult
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import equipment_of
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.action_executor import ActionExecutor
 from aerodaas.mission.commands import Actuate, Answer, Command, ReleaseParachute
@@ -71,9 +72,8 @@ class Actuation(ActionExecutor):
     order: ClassVar[int] = 2
 
     def __init__(self, vehicle: object, robot: RobotConfig, log: MissionLog) -> None:
-        """Use the actuators of `vehicle`, if it is an `ActuatedVehicle`; alerts go to `log`."""
-        # Once: to ask a protocol about an object looks up all its members each time.
-        self._vehicle = vehicle if isinstance(vehicle, ActuatedVehicle) else None
+        """Use the `Actuators` in the equipment of `vehicle`; alerts go to `log`."""
+        self._carried = equipment_of(vehicle, Actuators)
         self._robot = robot
         self._settings = added_settings(robot.mission, ActuatorMission)
         self._log = log
@@ -137,7 +137,7 @@ class Actuation(ActionExecutor):
         `now` is the mission clock, nanoseconds.
         """
         try:
-            actuators = None if self._vehicle is None else self._vehicle.actuators
+            actuators = self._carried
             for result in () if actuators is None else actuators.results():
                 self._on_result(result, now)
             for task in self._tasks.values():
@@ -236,7 +236,6 @@ class Actuation(ActionExecutor):
             task.number = actuators.move(*task.left[0].names)
 
     def _actuators(self) -> Actuators:
-        actuators = None if self._vehicle is None else self._vehicle.actuators
-        if actuators is None:
+        if self._carried is None:
             raise VehicleError("the vehicle has no actuators")
-        return actuators
+        return self._carried

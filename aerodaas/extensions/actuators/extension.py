@@ -1,4 +1,4 @@
-"""What actuators add to the core: an action of waypoints, and what performs it and commands."""
+"""What actuators add to the core: themselves, an action, what performs it and commands."""
 
 from aerodaas.config.extensions import Extension
 
@@ -10,6 +10,8 @@ EXTENSION = Extension(
         "robots[].mission.actuator_timeout",
         "robots[].mission.on_actuator_failure",
     ),
+    mavlink_components=("aerodaas.extensions.actuators.mavlink:MavlinkActuators",),
+    simulated_equipment=("aerodaas.extensions.actuators.simulated:SimulatedActuators",),
     actions=("aerodaas.extensions.actuators.actions:MoveActuator",),
     action_executors=("aerodaas.extensions.actuators.actuation:Actuation",),
     services={"actuators.objection": "aerodaas.extensions.actuators.objections:command_objection"},

@@ -13,7 +13,7 @@ from aerodaas.errors import ConfigError, VehicleError
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.vehicle import Capabilities, Setpoint, VehicleMode, VehicleState
 from aerodaas.recording.reader import Recording, vehicle_states
-from aerodaas.simulation.actuators import SimulatedActuators
+from aerodaas.simulation.equipment import simulated_equipment
 
 __all__ = ["ReplayedVehicle"]
 
@@ -27,7 +27,7 @@ class ReplayedVehicle:
 
     Settings: `path` of the recording, and `driver` and `settings` of the recorded robot, whose
     capabilities it reports. Commands have no effect; setpoints are accepted in the modes in
-    which the recorded vehicle accepted them. Actuators do as they are told, and move nothing.
+    which the recorded vehicle accepted them. Its equipment does as it is told, and moves nothing.
     """
 
     actuator_types: ClassVar[frozenset[str]] = ACTUATOR_TYPES
@@ -40,7 +40,7 @@ class ReplayedVehicle:
             raise ConfigError(f'robot {robot.id}: a replayed vehicle has the settings "path", '
                               '"driver" and "settings"')  # fmt: skip
         self._id = robot.id
-        self.actuators = SimulatedActuators(robot.actuators, lambda: None)
+        self.equipment = simulated_equipment(robot, environment, lambda: None, replayed=True)
         self._path = str(robot.settings["path"])
         self._capabilities = _capabilities(robot, environment)
         self._states: Iterator[tuple[int, VehicleState]] = iter(())
@@ -74,7 +74,8 @@ class ReplayedVehicle:
     def advance_to(self, stamp: int) -> None:
         """Advance to the newest state recorded up to mission time `stamp`, in nanoseconds."""
         self._now = stamp
-        self.actuators.advance_to(stamp)
+        for one in self.equipment:
+            one.advance_to(stamp)
         while self._next is not None and self._next[0] <= stamp:
             self._last, self._current = self._next
             self._next = next(self._states, None)

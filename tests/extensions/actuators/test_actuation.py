@@ -19,7 +19,7 @@ from aerodaas.config.sections.actuators import (
     ServoConfig,
 )
 from aerodaas.errors import VehicleError
-from aerodaas.messages.actuators import MoveResult
+from aerodaas.extensions.actuators.equipment import MoveResult
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.messages.waypoints import Waypoint
@@ -84,6 +84,11 @@ class Hauler(KinematicVehicle):
     def __init__(self, conduct: Literal["obey", "refuse", "silent", "lie"] = "obey") -> None:
         super().__init__()
         self.actuators = Carried(self, conduct)
+
+    @property
+    def equipment(self) -> tuple[Carried]:
+        """What it carries."""
+        return (self.actuators,)
 
 
 def prepared(
@@ -245,8 +250,10 @@ def test_what_a_driver_raises_ends_no_flight(error: Exception) -> None:
     class Broken:
         """Raises whatever it is asked."""
 
-        def __getattr__(self, _: str) -> object:
+        def fail(self, *_: object) -> None:
             raise error
+
+        move = release_parachute = withdraw = results = fail
 
     vehicle = Hauler()
     vehicle.actuators = Broken()  # type: ignore[assignment]

@@ -17,8 +17,9 @@ from aerodaas.config.sections.actuators import (
 )
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
-from aerodaas.messages.actuators import MoveResult
+from aerodaas.extensions.actuators.equipment import Actuators, MoveResult
 from aerodaas.messages.mission import MissionState
+from aerodaas.messages.vehicle import equipment_of
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.mission import Mission
 from tools.mavlink_vehicle import AutopilotOptions
@@ -49,6 +50,13 @@ def ends(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Ste
     return Stepped(monkeypatch, options, CARRIED)
 
 
+def actuators_of(ends: Stepped) -> Actuators:
+    """The driver's."""
+    actuators = equipment_of(ends.vehicle, Actuators)
+    assert actuators is not None
+    return actuators
+
+
 def carried(ends: Stepped) -> EmulatedActuators:
     """What goes wrong with them."""
     return ends.autopilot.firmware.actuators
@@ -61,7 +69,7 @@ def result(ends: Stepped, timeout: float = 15.0) -> MoveResult:
     while not said:
         assert ends.now < end, "waited in vain"
         ends.turn()
-        said += ends.vehicle.actuators.results()
+        said += actuators_of(ends).results()
     (one,) = said
     return one
 
@@ -70,7 +78,7 @@ def test_each_position_is_its_command(ends: Stepped) -> None:
     """With instance or channel, and the state that is to be reached; sent once where answered."""
     with ends:
         for name, position, command in COMMANDS:
-            number = ends.vehicle.actuators.move(name, position)
+            number = actuators_of(ends).move(name, position)
             assert result(ends) == MoveResult(number, accepted=True)
             assert carried(ends).asked[-1] == command
         assert len(carried(ends).asked) == len(COMMANDS)
@@ -89,7 +97,7 @@ def test_a_refusal_is_told_at_once(ends: Stepped, name: str) -> None:
     with ends:
         carried(ends).conduct = "refuse"
         position = next(one for one in CARRIED if one.id == name).positions
-        number = ends.vehicle.actuators.move(name, next(iter(position)))
+        number = actuators_of(ends).move(name, next(iter(position)))
         assert result(ends, 2.0) == MoveResult(number, accepted=False, reason="failed")
         assert ends.turn().actuators == {}
 
@@ -98,7 +106,7 @@ def test_silence_is_repeated_and_told(ends: Stepped) -> None:
     """Each time for the same state, never for the other one."""
     with ends:
         carried(ends).conduct = "silent"
-        ends.vehicle.actuators.move("hook", "release")
+        actuators_of(ends).move("hook", "release")
         assert result(ends) == MoveResult(1, accepted=False, reason="no answer")
         assert set(carried(ends).asked) == {(mavlink.MAV_CMD_DO_GRIPPER, 2.0, 0.0)}
         assert len(carried(ends).asked) == 6
@@ -115,7 +123,7 @@ def test_a_lie_is_found_out(ends: Stepped, name: str, position: str, said: str) 
     """By what the autopilot itself says that it puts out."""
     with ends:
         carried(ends).conduct = "lie"
-        ends.vehicle.actuators.move(name, position)
+        actuators_of(ends).move(name, position)
         assert result(ends) == MoveResult(1, accepted=False, reason=said)
         assert ends.turn().actuators == {}
 
@@ -123,7 +131,7 @@ def test_a_lie_is_found_out(ends: Stepped, name: str, position: str, said: str) 
 def test_commands_of_one_kind_do_not_replace_each_other(ends: Stepped) -> None:
     """One after the other, in order."""
     with ends:
-        numbers = [ends.vehicle.actuators.move("hook", one) for one in ("grab", "release", "grab")]
+        numbers = [actuators_of(ends).move("hook", one) for one in ("grab", "release", "grab")]
         assert [result(ends).number for _ in numbers] == numbers
         assert [one[2] for one in carried(ends).asked] == [1.0, 0.0, 1.0]
 
@@ -131,8 +139,8 @@ def test_commands_of_one_kind_do_not_replace_each_other(ends: Stepped) -> None:
 def test_a_doubled_acknowledgement_is_not_the_next_commands(ends: Stepped) -> None:
     """PX4 sends two: the second must not hide that the next command was not answered."""
     with ends:
-        ends.vehicle.actuators.move("hook", "grab")
-        ends.vehicle.actuators.move("hook", "release")
+        actuators_of(ends).move("hook", "grab")
+        actuators_of(ends).move("hook", "release")
         assert result(ends).accepted
         carried(ends).conduct = "silent"
         assert result(ends).reason == "no answer"
@@ -142,15 +150,15 @@ def test_what_is_withdrawn_is_repeated_no_more(ends: Stepped) -> None:
     """And what waits behind it has its turn."""
     with ends:
         carried(ends).conduct = "silent"
-        first = ends.vehicle.actuators.move("hook", "release")
-        second = ends.vehicle.actuators.move("pump", "on")
+        first = actuators_of(ends).move("hook", "release")
+        second = actuators_of(ends).move("pump", "on")
         ends.watch(0.2)
-        ends.vehicle.actuators.withdraw(first)
+        actuators_of(ends).withdraw(first)
         carried(ends).conduct = "obey"
         assert result(ends) == MoveResult(second, accepted=True)
         ends.watch(5.0)
         assert [one[0] for one in carried(ends).asked].count(mavlink.MAV_CMD_DO_GRIPPER) == 1
-        assert ends.vehicle.actuators.results() == []
+        assert actuators_of(ends).results() == []
 
 
 @pytest.mark.parametrize("position", ["release", "released", "2", ""])
@@ -158,10 +166,10 @@ def test_no_position_fires_a_parachute(ends: Stepped, position: str) -> None:
     """Nor is one fired that may not be."""
     with ends:
         with pytest.raises(VehicleError):
-            ends.vehicle.actuators.move("chute", position)
+            actuators_of(ends).move("chute", position)
         for name in ("locked", "hook"):
             with pytest.raises(VehicleError, match="may be fired"):
-                ends.vehicle.actuators.release_parachute(name)
+                actuators_of(ends).release_parachute(name)
         ends.watch(1.0)
         assert carried(ends).asked == []
 
@@ -171,9 +179,9 @@ def test_who_only_observes_moves_nothing(monkeypatch: pytest.MonkeyPatch) -> Non
     options = AutopilotOptions(actuators=True)
     with Stepped(monkeypatch, options, CARRIED, observe=True) as ends:
         with pytest.raises(VehicleError, match="observe"):
-            ends.vehicle.actuators.move("hook", "release")
+            actuators_of(ends).move("hook", "release")
         with pytest.raises(VehicleError, match="observe"):
-            ends.vehicle.actuators.release_parachute("chute")
+            actuators_of(ends).release_parachute("chute")
         ends.watch(1.0)
         assert carried(ends).asked == []
 

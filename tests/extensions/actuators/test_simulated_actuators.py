@@ -7,8 +7,8 @@ import pytest
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.drivers.simulated import SimulatedVehicle
-from aerodaas.messages.actuators import ActuatedVehicle, MoveResult
-from aerodaas.messages.vehicle import VehicleMode
+from aerodaas.extensions.actuators.equipment import Actuators, MoveResult
+from aerodaas.messages.vehicle import VehicleMode, equipment_of
 
 CARRIED = [
     {"id": "hook", "type": "gripper"},
@@ -28,10 +28,16 @@ def vehicle() -> SimulatedVehicle:
     return made
 
 
+def actuators_of(vehicle: SimulatedVehicle) -> Actuators:
+    """What it carries."""
+    actuators = equipment_of(vehicle, Actuators)
+    assert actuators is not None
+    return actuators
+
+
 def test_a_position_is_taken_after_its_time(vehicle: SimulatedVehicle) -> None:
     """And then told, once; nothing is known of what was not moved."""
-    assert isinstance(vehicle, ActuatedVehicle)
-    actuators = vehicle.actuators
+    actuators = actuators_of(vehicle)
     assert vehicle.read().actuators == {}
     number = actuators.move("hook", "release")
     vehicle.advance_to(NANOSECONDS // 2)
@@ -45,7 +51,7 @@ def test_a_position_is_taken_after_its_time(vehicle: SimulatedVehicle) -> None:
 
 def test_what_is_withdrawn_in_time_is_not_done(vehicle: SimulatedVehicle) -> None:
     """As over a radio link that was slow."""
-    actuators = vehicle.actuators
+    actuators = actuators_of(vehicle)
     actuators.withdraw(actuators.move("hook", "release"))
     vehicle.advance_to(2 * NANOSECONDS)
     assert vehicle.read().actuators == {}
@@ -57,7 +63,7 @@ def test_a_parachute_brings_it_down_whatever_is_asked(vehicle: SimulatedVehicle)
     vehicle.take_off(5.0)
     vehicle.advance_to(10 * NANOSECONDS)
     assert vehicle.read().mode is VehicleMode.HOLDING
-    vehicle.actuators.release_parachute("chute")
+    actuators_of(vehicle).release_parachute("chute")
     vehicle.advance_to(11 * NANOSECONDS)
     assert vehicle.read().mode is VehicleMode.FAILSAFE
     vehicle.land()

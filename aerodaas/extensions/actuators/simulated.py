@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.config.sections.actuators import ActuatorConfig
-from aerodaas.messages.actuators import MoveResult
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.extensions.actuators.equipment import MoveResult
+from aerodaas.messages.vehicle import VehicleState
+from aerodaas.simulation.equipment import SimulatedEquipment
 
 __all__ = ["SimulatedActuators"]
 
@@ -24,23 +27,23 @@ class _Move(NamedTuple):
     """Mission clock at which it is done, nanoseconds."""
 
 
-class SimulatedActuators:
-    """Do as they are told; implement `aerodaas.messages.actuators.Actuators`."""
+class SimulatedActuators(SimulatedEquipment):
+    """Do as they are told; implement `Actuators`."""
 
-    def __init__(self, actuators: list[ActuatorConfig], fire: Callable[[], None]) -> None:
-        """Carry `actuators`; `fire` is called when a parachute opens."""
-        self._types = {one.id: one.type for one in actuators}
-        self._fire = fire
+    replays = True
+
+    def __init__(
+        self, robot: RobotConfig, environment: EnvironmentConfig, descend: Callable[[], None]
+    ) -> None:
+        """Carry those of `robot`; a parachute that opens has it `descend`."""
+        super().__init__(robot, environment, descend)
+        self._types = {one.id: one.type for one in robot.actuators}
+        self._descend = descend
         self._positions: dict[str, str] = {}
         self._moves: list[_Move] = []
         self._results: list[MoveResult] = []
         self._asked = 0
         self._now = 0
-
-    @property
-    def positions(self) -> Mapping[str, str]:
-        """The positions last taken, by actuator."""
-        return dict(self._positions)
 
     def move(self, actuator: str, position: str) -> int:
         """Take a position from now on.
@@ -70,6 +73,10 @@ class SimulatedActuators:
         results, self._results = self._results, []
         return results
 
+    def complete(self, state: VehicleState) -> VehicleState:
+        """Add the positions last taken."""
+        return replace(state, actuators=dict(self._positions)) if self._positions else state
+
     def advance_to(self, stamp: int) -> None:
         """Move until mission time `stamp`, nanoseconds."""
         self._now = stamp
@@ -80,5 +87,5 @@ class SimulatedActuators:
                 self._positions[one.actuator] = one.position
             else:
                 self._positions[one.actuator] = "released"
-                self._fire()
+                self._descend()
             self._results.append(MoveResult(one.number, accepted=True))

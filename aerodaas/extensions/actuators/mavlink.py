@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 from aerodaas.config.sections.actuators import (
     ActuatorConfig,
@@ -21,16 +19,18 @@ from aerodaas.config.sections.actuators import (
     RelayConfig,
     ServoConfig,
 )
+from aerodaas.drivers.mavlink.component import ComponentContext, MavlinkComponent, MessageHandler
+from aerodaas.drivers.mavlink.connecting import Connection
 from aerodaas.drivers.mavlink.microservices.commander import (
     Commander,
     CommandResult,
     PendingCommand,
 )
-from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.errors import VehicleError
-from aerodaas.messages.actuators import MoveResult
+from aerodaas.extensions.actuators.equipment import MoveResult
+from aerodaas.messages.vehicle import VehicleState
 
 __all__ = ["MavlinkActuators"]
 
@@ -61,25 +61,15 @@ class _Move:
     due: float = 0.0
 
 
-class MavlinkActuators:
-    """The actuators of one vehicle; implements `aerodaas.messages.actuators.Actuators`.
+class MavlinkActuators(MavlinkComponent):
+    """The actuators of one vehicle; implements `Actuators`."""
 
-    The link's thread calls `take` and `turn`, the loop's thread the rest, under one lock.
-    """
-
-    messages: ClassVar[frozenset[str]] = frozenset({"SERVO_OUTPUT_RAW", "RELAY_STATUS"})
-    """What `take` processes."""
-
-    def __init__(
-        self,
-        actuators: Sequence[ActuatorConfig],
-        settings: MavlinkSettings,
-        lock: AbstractContextManager[object],
-    ) -> None:
-        """Carry `actuators`; by `settings` that only observe, none is moved."""
-        self._known = {one.id: one for one in actuators}
-        self._lock = lock
-        self._observes = settings.observe
+    def __init__(self, context: ComponentContext) -> None:
+        """Carry those of the robot; with settings that only observe, none is moved."""
+        super().__init__(context)
+        self._known = {one.id: one for one in context.robot.actuators}
+        self._lock = context.lock
+        self._observes = context.settings.observe
         self._commander: Commander | None = None
         self._waiting: deque[_Move] = deque()
         self._current: _Move | None = None
@@ -89,14 +79,20 @@ class MavlinkActuators:
         self._free_at: dict[int, float] = {}
         """When the next command of a number may be sent."""
 
-    def use(self, commander: Commander) -> None:
-        """Command the vehicle by `commander` from now on."""
-        self._commander = commander
-
     @property
-    def positions(self) -> Mapping[str, str]:
-        """See `Actuators`."""
-        return dict(self._positions)
+    def handlers(self) -> Mapping[str, MessageHandler]:
+        """Handlers of the messages that tell what the autopilot puts out."""
+        return dict.fromkeys(("SERVO_OUTPUT_RAW", "RELAY_STATUS"), self._on_output)
+
+    def connect(self, connection: Connection) -> None:
+        """Command the vehicle from now on."""
+        super().connect(connection)
+        self._commander = connection.commander
+
+    def complete(self, state: VehicleState, now: float, placed_at: float) -> VehicleState:
+        """Add the positions that the vehicle has acknowledged."""
+        del now, placed_at
+        return replace(state, actuators=dict(self._positions)) if self._positions else state
 
     def move(self, actuator: str, position: str) -> int:
         """See `Actuators`.
@@ -183,8 +179,8 @@ class MavlinkActuators:
         if self._commander is not None:
             self._next(self._commander)
 
-    def on_message(self, message: Message) -> None:
-        """Process one of `messages`; in the link's thread."""
+    def _on_output(self, message: Message, now: float) -> None:
+        del now
         move = self._current
         if move is None or not move.acknowledged or not move.requests:
             return
@@ -195,7 +191,7 @@ class MavlinkActuators:
             self._end(move, f"acknowledged, and not done: {contradiction}")
 
     def step(self, now: float) -> None:
-        """Ask what is put out; in the link's thread."""
+        """Ask what is put out."""
         commander = self._commander
         if commander is None:
             return

@@ -1,23 +1,18 @@
 """What a vehicle carries to act with: grippers, servos, relays and parachutes, by name.
 
 A driver implements `Actuators` for the actuators of the robot's section in the environment file,
-and hands it out as an `ActuatedVehicle`. A command names the position that is to be reached, never
+and lists it in its `equipment`. A command names the position that is to be reached, never
 a change of the present one: so it may be repeated without harm.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from aerodaas.messages.serialization.records import fast_pickle
-from aerodaas.messages.vehicle import Vehicle
-
-__all__ = ["ActuatedVehicle", "Actuators", "MoveResult"]
+__all__ = ["Actuators", "MoveResult"]
 
 
-@fast_pickle
 @dataclass(frozen=True, slots=True)
 class MoveResult:
     """Result of one command to an actuator."""
@@ -30,6 +25,7 @@ class MoveResult:
     """Why it was not, in a few words."""
 
 
+@runtime_checkable
 class Actuators(Protocol):
     """The actuators of one vehicle; every method returns at once."""
 
@@ -67,22 +63,4 @@ class Actuators(Protocol):
 
     def results(self) -> list[MoveResult]:
         """Results of commands since the last call."""
-        ...
-
-    @property
-    def positions(self) -> Mapping[str, str]:
-        """The positions last taken, by actuator, as far as the vehicle has acknowledged them.
-
-        One that was not moved since connecting is not in it: nobody knows where it stands.
-        """
-        ...
-
-
-@runtime_checkable
-class ActuatedVehicle(Vehicle, Protocol):
-    """A vehicle whose driver can move actuators."""
-
-    @property
-    def actuators(self) -> Actuators | None:
-        """Its actuators; None if the environment file names none."""
         ...
