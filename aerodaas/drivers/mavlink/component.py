@@ -11,7 +11,7 @@ from aerodaas.config.extensions import added
 from aerodaas.config.model import RobotConfig
 from aerodaas.drivers.mavlink.connecting import Connection
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
-from aerodaas.drivers.mavlink.state.phase import FlightPhase
+from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.messages.health import HealthReadings
@@ -33,6 +33,8 @@ class ComponentContext:
     """Newest messages of the autopilot."""
     phase: FlightPhase
     """Flight mode of the autopilot, and the one that it was asked for."""
+    change_mode: Callable[[FlightMode, Callable[[str], None]], None]
+    """Asks the autopilot for a mode; the second is called with the reason of a refusal."""
     lock: AbstractContextManager[object]
     """Held while the driver calls the component, which may be in another thread."""
     now: Callable[[], int]

@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import ClassVar
@@ -29,7 +29,6 @@ from aerodaas.drivers.mavlink.control.mode_change import ModeChange, flight_obje
 from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.control.watchdog import Watchdog
 from aerodaas.drivers.mavlink.microservices.commander import Commander
-from aerodaas.drivers.mavlink.microservices.mission_mode import MavlinkMissionMode
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
 from aerodaas.drivers.mavlink.one_link import check_links, link_of
 from aerodaas.drivers.mavlink.settings import MavlinkSettings, mavlink_settings
@@ -93,6 +92,7 @@ class MavlinkVehicle:
             self._settings,
             self._telemetry,
             self._phase,
+            self._change,
             self._lock,
             self._mission_time,
         )
@@ -107,8 +107,6 @@ class MavlinkVehicle:
         self._rates: RateKeeper | None = None
         self._departure: Departure | None = None
         self._modes: ModeChange | None = None
-        self.mission_mode: MavlinkMissionMode | None = None
-        """Its own mission mode; None before it is connected."""
         self._completion = ClimbCompletion(self._telemetry, self._phase)
         self._checked_at = -math.inf
         self._told: VehicleMode | None = None
@@ -120,7 +118,6 @@ class MavlinkVehicle:
             "LOCAL_POSITION_NED": self._on_local_position,
             "GLOBAL_POSITION_INT": self._on_global_position,
             "EXTENDED_SYS_STATE": self._on_landed_state,
-            **dict.fromkeys(MavlinkMissionMode.messages, self._on_mission_message),
         }
         """Handlers of the autopilot's messages by their name, after the telemetry."""
         for component in self.equipment:
@@ -214,15 +211,6 @@ class MavlinkVehicle:
             self._connection.alignment.require_same_boot()
             for component in self.equipment:
                 component.connect(self._connection)
-            self.mission_mode = MavlinkMissionMode(
-                self._robot,
-                self._settings,
-                connection=self._connection,
-                telemetry=self._telemetry,
-                phase=self._phase,
-                modes=self._modes,
-                lock=self._lock,
-            )
         except BaseException:
             self.close()
             raise
@@ -387,8 +375,7 @@ class MavlinkVehicle:
             waits=self._phase.shown is not FlightMode.GUIDED,
         )
         connection.link.send(message)
-        changes = any(component.changes_mode for component in self.equipment)
-        if not changes and (self.mission_mode is None or not self.mission_mode.starts):
+        if not any(component.changes_mode for component in self.equipment):
             before = connection.autopilot.stream_before
             self._steering.see_to_guidance(self._phase, before, self._change, now)
         return sent
@@ -429,10 +416,10 @@ class MavlinkVehicle:
                     # A landing mode does not stop motors before the first lift-off.
                     connection.departure.withdraw(time.monotonic())
 
-    def _change(self, wish: FlightMode) -> None:
+    def _change(self, wish: FlightMode, *refused: Callable[[str], None]) -> None:
         self._connected()
         assert self._modes is not None  # noqa: S101 - made before the connection
-        self._modes.ask(wish)
+        self._modes.ask(wish, *refused)
 
     def grounded_link(self, deed: str) -> MavlinkLink:
         """The link of a vehicle that stands, for services that need much of it.
@@ -525,10 +512,6 @@ class MavlinkVehicle:
     def _on_landed_state(self, _: Message, now: float) -> None:
         self._touchdown.report(now, on_ground=self._telemetry.on_ground)
 
-    def _on_mission_message(self, message: Message, now: float) -> None:
-        if self.mission_mode is not None:
-            self.mission_mode.on_message(message, now)
-
     def _on_heartbeat(self, _: Message, now: float) -> None:
         found, telemetry, phase = self._finder.found, self._telemetry, self._phase
         assert found is not None  # noqa: S101 - it speaks
@@ -564,8 +547,6 @@ class MavlinkVehicle:
             self._touchdown.update(now)
             for component in self.equipment:
                 component.step(now)
-            if self.mission_mode is not None:
-                self.mission_mode.step(now)
             if self._connection is not None:
                 self._connection.departure.update(now)
                 self._climb_on(self._connection, now)

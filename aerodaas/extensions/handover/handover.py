@@ -17,15 +17,14 @@ from numpy.typing import NDArray
 from aerodaas.clock import seconds
 from aerodaas.config.sections.robot import LimitsConfig
 from aerodaas.errors import VehicleError
-from aerodaas.geometry.frames import Vector
-from aerodaas.messages.mission import MissionState
-from aerodaas.messages.mission_mode import (
+from aerodaas.extensions.handover.mission_mode import (
     MissionMode,
     MissionModePhase,
-    MissionModeVehicle,
     PlannedPlace,
 )
-from aerodaas.messages.vehicle import VehicleMode, VehicleState
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.vehicle import Vehicle, VehicleMode, VehicleState, equipment_of
 from aerodaas.mission.commands import Answer, HandOver, TakeBack
 from aerodaas.mission.handover import HANDED_OVER, Handover, HandoverContext
 from aerodaas.mission.navigation.queue import QueuedWaypoint
@@ -126,9 +125,7 @@ class AutopilotHandover(Handover):
     def __init__(self, context: HandoverContext) -> None:
         """Use the mission mode of the vehicle, if it has one."""
         super().__init__(context)
-        vehicle = context.vehicle
-        # Once: to ask a protocol about an object looks up all its members each time.
-        self._vehicle = vehicle if isinstance(vehicle, MissionModeVehicle) else None
+        self._mode = equipment_of(context.vehicle, MissionMode)
         self._flies = False
         self._stops: list[QueuedWaypoint] = []
         """What was uploaded; empty while nothing is handed over."""
@@ -183,20 +180,17 @@ class AutopilotHandover(Handover):
             return MissionState.LOITERING, f"at {stop.id}, by the autopilot's mission mode"
         return MissionState.ENROUTE, f"flying to {stop.id} by the autopilot's mission mode"
 
-    def _mode(self) -> MissionMode | None:
-        return None if self._vehicle is None else self._vehicle.mission_mode
-
     def _upload(self, stops: list[QueuedWaypoint], state: VehicleState) -> str:
         """Begin to upload `stops`; returns why not, empty if it is under way."""
-        mode, limits = self._mode(), self.context.robot.limits
-        if self._vehicle is None or mode is None:
+        mode, vehicle, limits = self._mode, self.context.vehicle, self.context.robot.limits
+        if mode is None or not isinstance(vehicle, Vehicle):
             return f"its driver, {self.context.robot.driver}, knows no mission mode"
         if state.mode not in _STEERED or not has_position(state):
             return f"the vehicle is {state.mode.value}"
         position = state.odometry.position
         if text := unflyable(stops, position, limits, self.context.route, self.context.clearance):
             return text
-        places = planned_places(stops, limits, self._vehicle.capabilities.max_speed)
+        places = planned_places(stops, limits, vehicle.capabilities.max_speed)
         if text := mode.objection(places):
             return text
         try:
@@ -213,8 +207,8 @@ class AutopilotHandover(Handover):
         """Let the drone fly by setpoints again, if the autopilot flies or is about to."""
         if not self._stops:
             return
-        if mode := self._mode():
-            mode.clear()
+        if self._mode is not None:
+            self._mode.clear()
         what = "the hand-over has ended" if self._flies else "not handed over"
         self.context.log.alert(now, _KIND, f"{what}: {reason}")
         self._stops = []
@@ -222,7 +216,7 @@ class AutopilotHandover(Handover):
 
     def step(self, stops: Sequence[QueuedWaypoint], state: VehicleState, now: int) -> bool:
         """Follow how far the hand-over is; a plan that has changed on the way is taken back."""
-        mode = self._mode()
+        mode = self._mode
         if not self._stops or mode is None:
             return False
         ahead, queued = self._stops[self._done :], list(stops)
@@ -261,7 +255,7 @@ class AutopilotHandover(Handover):
 
         Takes back what is not flown as it should be.
         """
-        mode = self._mode()
+        mode = self._mode
         if mode is None or not self._flies or not has_position(state):
             return []
         progress, radius = mode.progress, self.context.robot.limits.arrival_radius

@@ -8,23 +8,19 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
-from typing import Any, ClassVar
+from collections.abc import Mapping, Sequence
 
-from aerodaas.config.model import RobotConfig
 from aerodaas.drivers.mavlink.autopilots.autopilot import NOT_GIVEN, Autopilot
+from aerodaas.drivers.mavlink.component import ComponentContext, MavlinkComponent, MessageHandler
 from aerodaas.drivers.mavlink.connecting import Connection
-from aerodaas.drivers.mavlink.control.mode_change import ModeChange
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem, Upload, item_place
-from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
-from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
-from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.state.phase import FlightMode
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.errors import VehicleError
+from aerodaas.extensions.handover.mission_mode import MissionModePhase, PlannedPlace, PlanProgress
 from aerodaas.geometry.frames import GeodeticOrigin
-from aerodaas.messages.mission_mode import MissionModePhase, PlannedPlace, PlanProgress
 from aerodaas.messages.vehicle import VehicleMode
 
 __all__ = ["MavlinkMissionMode", "mission_items"]
@@ -111,37 +107,27 @@ def _item(
     return MissionItem(command, values, *there, altitude, mavlink.MAV_FRAME_GLOBAL)
 
 
-class MavlinkMissionMode:
-    """`MissionMode` of one connected vehicle; called under the driver's lock."""
+class MavlinkMissionMode(MavlinkComponent):
+    """`MissionMode` of one vehicle."""
 
-    messages: ClassVar[frozenset[str]] = Upload.messages | {
-        "MISSION_CURRENT",
-        "MISSION_ITEM_REACHED",
-    }
-    """Names of the vehicle's messages that it takes."""
-
-    def __init__(
-        self,
-        robot: RobotConfig,
-        settings: MavlinkSettings,
-        *,
-        connection: Connection,
-        telemetry: Telemetry,
-        phase: FlightPhase,
-        modes: ModeChange,
-        lock: AbstractContextManager[object],
-    ) -> None:
-        """Of `robot`; the mission calls by its own thread, under the driver's `lock`."""
-        self._robot = robot
-        self._settings = settings
-        self._link = connection.link
-        self._autopilot = connection.autopilot
-        self._alignment = connection.alignment
-        self._telemetry = telemetry
-        self._flight = phase
-        self._modes = modes
-        self._lock = lock
+    def __init__(self, context: ComponentContext) -> None:
+        """Have no plan yet."""
+        super().__init__(context)
+        self._telemetry = context.telemetry
+        self._flight = context.phase
+        self._lock = context.lock
         self._forget()
+
+    @property
+    def handlers(self) -> Mapping[str, MessageHandler]:
+        """Handlers of the messages about the upload, and about progress in the plan."""
+        names = (*Upload.messages, "MISSION_CURRENT", "MISSION_ITEM_REACHED")
+        return dict.fromkeys(names, self._on_message)
+
+    def _vehicle(self) -> Connection:
+        if self.connection is None:
+            raise VehicleError("it is not connected")
+        return self.connection
 
     def clear(self) -> None:
         """Forget the plan."""
@@ -159,7 +145,7 @@ class MavlinkMissionMode:
         self._deadline = math.inf
 
     @property
-    def starts(self) -> bool:
+    def changes_mode(self) -> bool:
         """Whether the mode was asked for, and is not shown yet."""
         return self._phase is _P.STARTING
 
@@ -171,17 +157,16 @@ class MavlinkMissionMode:
 
     def objection(self, places: Sequence[PlannedPlace]) -> str:
         """Why it cannot fly these places, or not now; empty if it can."""
-        name = self._autopilot.name
-        if self._settings.observe:
+        if self.connection is None:
+            return "it is not connected"
+        autopilot, alignment = self.connection.autopilot, self.connection.alignment
+        if self.context.settings.observe:
             return 'with "observe" it is only looked at'
-        if (
-            any(place.yaw is not None for place in places)
-            and not self._autopilot.turns_at_waypoints
-        ):
-            return f"{name} turns to no yaw at a waypoint"
-        known = self._alignment.frame is not None and self._alignment.sea_level is not None
+        if any(place.yaw is not None for place in places) and not autopilot.turns_at_waypoints:
+            return f"{autopilot.name} turns to no yaw at a waypoint"
+        known = alignment.frame is not None and alignment.sea_level is not None
         if self._telemetry.home is None or not known:
-            return f"{name} does not tell where it is, or where its home lies"
+            return f"{autopilot.name} does not tell where it is, or where its home lies"
         return self._home_fault()
 
     def _home_fault(self) -> str:
@@ -192,20 +177,23 @@ class MavlinkMissionMode:
     def upload(self, places: Sequence[PlannedPlace]) -> None:
         """Begin to replace the plan on the vehicle; raises VehicleError."""
         with self._lock:
-            sea_level = self._alignment.sea_level
+            connection = self._vehicle()
+            sea_level = connection.alignment.sea_level
             if (text := self.objection(places)) or sea_level is None:
                 raise VehicleError(text)
             self._forget()
             items, self._numbers = mission_items(
                 places,
-                self._autopilot,
-                origin=self._alignment.origin,
+                connection.autopilot,
+                origin=connection.alignment.origin,
                 sea_level=sea_level,
-                radius=self._robot.limits.arrival_radius,
+                radius=self.context.robot.limits.arrival_radius,
             )
             self._count = len(items)
             self._phase = _P.UPLOADING
-            self._upload = Upload(self._link.send, self._link.target, items, now=time.monotonic())
+            self._upload = Upload(
+                connection.link.send, connection.target, items, now=time.monotonic()
+            )
 
     def start(self) -> None:
         """Ask for the mission mode; raises VehicleError if no plan is ready."""
@@ -214,19 +202,13 @@ class MavlinkMissionMode:
                 mode = self._flight.mode.value
                 raise VehicleError(f"no plan is ready to be flown by a vehicle that is {mode}")
             self._phase, self._deadline = _P.STARTING, time.monotonic() + _START
-            self._modes.ask(FlightMode.MISSION, self._refused)
+            self.context.change_mode(FlightMode.MISSION, self._refused)
 
     def _refused(self, text: str) -> None:
         if self._phase is _P.STARTING:
             self._fail(text)
 
-    def on_message(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Process one of `messages`.
-
-        Args:
-            message: The message.
-            now: Monotonic clock, seconds.
-        """
+    def _on_message(self, message: Message, now: float) -> None:
         kind = message.get_type()
         if kind in Upload.messages:
             if self._upload is not None:
@@ -238,7 +220,7 @@ class MavlinkMissionMode:
             self._follow(message.seq, reached=kind == "MISSION_ITEM_REACHED")
 
     def step(self, now: float) -> None:
-        """Do what is due; called 20 times a second."""
+        """Do what is due."""
         if self._phase is _P.UPLOADING:
             if self._upload is not None:
                 self._upload.step(now)
@@ -249,7 +231,7 @@ class MavlinkMissionMode:
             if self._flight.flies_plan and self._flight.seen:
                 self._phase = _P.FLYING
             elif now >= self._deadline:
-                self._fail(f"{self._autopilot.name} does not show its mission mode")
+                self._fail(f"{self._vehicle().autopilot.name} does not show its mission mode")
         elif self._phase is _P.FLYING:
             wish = self._flight.wish
             if wish is not None and wish is not FlightMode.MISSION:
@@ -267,14 +249,20 @@ class MavlinkMissionMode:
 
     def _select(self, now: float) -> None:
         if self._asked == _TRIES:
-            self._fail(f"{self._autopilot.name} does not say that it would begin with the first")
+            self._fail(
+                f"{self._vehicle().autopilot.name} does not say that it would begin with the first"
+            )
             return
         self._asked, self._deadline = self._asked + 1, now + _SELECTION
-        first = int(self._autopilot.home_comes_first)
-        self._link.send(mavlink.MAVLink_mission_set_current_message(*self._link.target, first))
+        vehicle, first = self._vehicle(), self._first()
+        vehicle.link.send(mavlink.MAVLink_mission_set_current_message(*vehicle.target, first))
 
-    def _selected(self, message: Any) -> None:  # noqa: ANN401
-        if self._asked and int(self._autopilot.home_comes_first) <= message.seq <= self._numbers[0]:
+    def _first(self) -> int:
+        """Number of the item with which the plan begins."""
+        return int(self._vehicle().autopilot.home_comes_first)
+
+    def _selected(self, message: Message) -> None:
+        if self._asked and self._first() <= message.seq <= self._numbers[0]:
             self._phase, self._deadline = _P.READY, math.inf
 
     def _follow(self, number: int, *, reached: bool) -> None:

@@ -1,6 +1,6 @@
 """An autopilot's own mission mode: it flies a plan by itself, place by place.
 
-A driver whose vehicle has one hands it out as a `MissionModeVehicle`. It is taken back by any
+A driver whose vehicle has one lists it in its `equipment`. The vehicle is taken back by any
 setpoint, or by an order to hold, return or land: those always come first.
 """
 
@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from aerodaas.geometry.frames import Vector
-from aerodaas.messages.vehicle import Vehicle
 
-__all__ = ["MissionMode", "MissionModePhase", "MissionModeVehicle", "PlanProgress", "PlannedPlace"]
+__all__ = ["MissionMode", "MissionModePhase", "PlanProgress", "PlannedPlace"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +56,7 @@ class PlanProgress:
     """How many places, counted from the first, it says that it is done with."""
 
 
+@runtime_checkable
 class MissionMode(Protocol):
     """The mission mode of one vehicle; every method returns at once."""
 
@@ -83,14 +83,4 @@ class MissionMode(Protocol):
     @property
     def progress(self) -> PlanProgress:
         """How far the plan has come."""
-        ...
-
-
-@runtime_checkable
-class MissionModeVehicle(Vehicle, Protocol):
-    """A vehicle that can fly a plan by itself."""
-
-    @property
-    def mission_mode(self) -> MissionMode | None:
-        """Its mission mode; None before it is connected."""
         ...
