@@ -50,6 +50,7 @@ Hook = Literal[
     "report_sections",
     "routes",
     "safety_rules",
+    "sidecar_writers",
     "simulated_equipment",
 ]
 """A field of `Extension` that names code which the core calls for every flight or server."""
@@ -148,6 +149,8 @@ class Extension:
     vehicle: equipment by messages of its own, or a service of the autopilot."""
     simulated_equipment: tuple[str, ...] = ()
     """`module:Class` of each `simulation.equipment.SimulatedEquipment` of every simulated drone."""
+    sidecar_writers: tuple[str, ...] = ()
+    """`module:Class` of each `recording.sidecar.SidecarWriter` of files beside a recording."""
     safety_rules: tuple[str, ...] = ()
     """`module:Class` of each `mission.safety.supervisor.SafetyRule` of every drone, made with the
     robot's limits."""

@@ -9,6 +9,7 @@ EXTENSION = Extension(
     recorded_settings=("robots[].mission.photo_timeout",),
     mavlink_components=("aerodaas.extensions.payload.mavlink.component:MavlinkPayload",),
     simulated_equipment=("aerodaas.extensions.payload.simulated:SimulatedPayload",),
+    sidecar_writers=("aerodaas.extensions.payload.photo_album:PhotoAlbum",),
     actions=(
         "aerodaas.extensions.payload.actions:TriggerPhotos",
         "aerodaas.extensions.payload.actions:LookAt",

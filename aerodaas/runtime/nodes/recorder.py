@@ -7,22 +7,21 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from aerodaas.config.extensions import imported, live_views
+from aerodaas.config.extensions import added, imported, live_views
 from aerodaas.config.options import LiveViews
 from aerodaas.errors import RecordingError, failure_line
 from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Header
-from aerodaas.messages.payload import Photo
 from aerodaas.messages.vitals import Vitals
 from aerodaas.recording.provenance import Provenance
+from aerodaas.recording.sidecar import SidecarWriter
 from aerodaas.runtime.node import Host, Node
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import vitals_stream
 
 if TYPE_CHECKING:
     from aerodaas.recording.live import LiveServer
-    from aerodaas.recording.photo_album import PhotoAlbum
     from aerodaas.recording.recorder import FlightRecorder
 
 __all__ = ["RecorderNode"]
@@ -68,7 +67,7 @@ class RecorderNode(Node):
         self._views = views or LiveViews()
         self._readings = 0
         self._recorder: FlightRecorder | None = None
-        self._album: PhotoAlbum | None = None
+        self._sidecars: list[SidecarWriter] = []
         self._live: LiveServer | None = None
         self._shown: dict[str, LiveMessages] = {}
 
@@ -77,7 +76,6 @@ class RecorderNode(Node):
         super().open(host)
         # The application's process imports this module, but does not need the writers.
         from aerodaas.recording.live import LiveServer  # noqa: PLC0415
-        from aerodaas.recording.photo_album import PhotoAlbum, album_folder  # noqa: PLC0415
         from aerodaas.recording.recorder import FlightRecorder  # noqa: PLC0415
 
         environment = self._session.environment
@@ -91,7 +89,7 @@ class RecorderNode(Node):
             self._shown[name] = view(place, self._provenance.started_ns, quality)
         # A recorder that is set up again keeps its predecessor's file and writes a second part.
         self.path = _unwritten(self.path)
-        self._album = PhotoAlbum(album_folder(self.path), environment)
+        self._sidecars = [kind(self.path, environment) for kind in added("sidecar_writers")]
         self._recorder = FlightRecorder(
             self.path,
             config=environment.recording,
@@ -128,8 +126,14 @@ class RecorderNode(Node):
         except RecordingError as error:
             self.failure = str(error)
             self.host.alert("recording_stopped", self.failure)
-        if isinstance(message.item, Photo):
-            self._keep(message.stream.partition("/")[0], message.item)
+        for sidecar in self._sidecars:
+            self._write_beside(sidecar, message)
+
+    def _write_beside(self, sidecar: SidecarWriter, message: Message[Any]) -> None:
+        try:
+            sidecar.write(message)
+        except RecordingError as error:
+            self.host.alert(sidecar.kind, str(error))
 
     def write_vitals(self, readings: Mapping[str, Vitals], now: int) -> None:
         """Record the vitals of the run's processes.
@@ -170,22 +174,13 @@ class RecorderNode(Node):
                 ended.close()
                 self.host.alert(f"{name}_stopped", failure_line(error))
 
-    def _keep(self, robot: str, photo: Photo) -> None:
-        """Keep a picture beside the recording; one that cannot be kept does not end it."""
-        if self._album is None:
-            return
-        try:
-            self._album.add(robot, photo)
-        except RecordingError as error:
-            self.host.alert("photo", str(error))
-
     def close(self) -> None:
         """Finish the file; raises RecordingError if the recording had to stop."""
         if self._recorder is None:
             return
         summary = self._recorder.close()
-        if self._album is not None:
-            self._album.close()
+        for sidecar in self._sidecars:
+            sidecar.close()
         if self._live is not None:
             self._live.close()
         for view in self._shown.values():

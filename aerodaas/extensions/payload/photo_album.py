@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import math
 from pathlib import Path
+from typing import Any
 
 import cv2
 from PIL import Image
@@ -19,9 +20,11 @@ from aerodaas.clock import seconds
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.errors import AeroDaaSError, RecordingError
 from aerodaas.geometry.frames import wrap_angle, yaw_enu_to_ned
+from aerodaas.messages.envelope import Message
 from aerodaas.messages.payload import Photo, PhotoPlace
+from aerodaas.recording.sidecar import SidecarWriter
 
-__all__ = ["COLUMNS", "PhotoAlbum", "album_folder"]
+__all__ = ["COLUMNS", "PhotoAlbum"]
 
 COLUMNS = (
     *("file", "latitude", "longitude", "altitude", "altitude_above"),
@@ -38,34 +41,28 @@ _ABOVE, _BELOW = b"\x00", b"\x01"
 """GPSAltitudeRef, the sign: EXIF 2 means the sea by it, EXIF 3 the ellipsoid; the table tells."""
 
 
-def album_folder(recording: Path) -> Path:
-    """The folder of the pictures of a recording."""
-    return recording.with_name(f"{recording.stem}-photos")
-
-
-class PhotoAlbum:
+class PhotoAlbum(SidecarWriter):
     """Keeper of one recording's pictures, for one thread, which renders.
 
     Nothing is made before the first picture.
     """
 
-    def __init__(self, folder: Path, environment: EnvironmentConfig) -> None:
-        """Keep pictures in `folder`, which must not hold others."""
-        self._folder = folder
+    kind = "photo"
+
+    def __init__(self, recording: Path, environment: EnvironmentConfig) -> None:
+        """Keep pictures in the folder `NAME-photos` beside the recording `NAME.mcap`."""
+        super().__init__(recording, environment)
+        self._folder = recording.with_name(f"{recording.stem}-photos")
         self._environment = environment
         self._cameras: dict[str, SimulatedCamera] = {}
         self._count = 0
 
-    def add(self, robot: str, photo: Photo) -> None:
-        """Keep one picture.
+    def write(self, message: Message[Any]) -> None:
+        """Keep a picture; raises RecordingError if it cannot be kept."""
+        if isinstance(message.item, Photo):
+            self._add(message.stream.partition("/")[0], message.item)
 
-        Args:
-            robot: Id of the robot that took it.
-            photo: The picture.
-
-        Raises:
-            RecordingError: If it cannot be kept.
-        """
+    def _add(self, robot: str, photo: Photo) -> None:
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             self._count += 1
