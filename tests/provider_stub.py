@@ -132,6 +132,7 @@ class Stub:
             ("GET", "/missions", self._missions),
             ("GET", "/missions/{mission}", self._mission),
             ("DELETE", "/missions/{mission}", self._cancel),
+            ("POST", "/missions/{mission}/approve", self._mission),
             ("POST", "/missions/{mission}/commands", self._command),
             ("POST", "/missions/{mission}/navigation", self._navigation),
             ("GET", "/missions/{mission}/recording", self._recording),

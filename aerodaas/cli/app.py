@@ -90,7 +90,7 @@ _CORE = (
     Command(
         "missions",
         "aerodaas.cli.provider.missions:app",
-        "List, watch and cancel missions at a provider, grant their cameras, fetch recordings.",
+        "List, watch, approve and cancel missions at a provider, grant cameras, fetch recordings.",
         panel=_PROVIDER,
     ),
     Command(

@@ -554,7 +554,7 @@ class AuditOut(AnswerModel):
 
     at: float
     account: str
-    """Empty for a request without a valid token."""
+    """Empty for a request without a valid token, and for what the service itself does."""
     tenant: str
     address: str
     action: str

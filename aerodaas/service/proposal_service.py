@@ -200,8 +200,7 @@ class ProposalService:
             if len(own) >= _MOST_PROPOSALS:
                 raise RefusedError(
                     429,
-                    f"{row.account} has {_MOST_PROPOSALS} proposals that are not over: "
-                    "cancel some (DELETE /v1/missions/ID)",
+                    f"{row.account} has {_MOST_PROPOSALS} proposals that are not over: cancel some",
                     retry_after=60.0,
                 )
             if row.phase is MissionPhase.REHEARSING:
@@ -241,12 +240,9 @@ class ProposalService:
         """Raise RefusedError for a document with findings: a rehearsal would only take longer."""
         report = self._report(row, document)
         if not report.passed:
-            first = report.findings[0]
-            raise RefusedError(
-                409,
-                f"its check has {len(report.findings)} findings, of which the first is: "
-                f"{first.text}; {first.remedy}",
-            )
+            first, *others = report.findings
+            more = f" ({len(others)} more findings)" if others else ""
+            raise RefusedError(409, f"its check found: {first.text}; {first.remedy}{more}")
 
     def rehearse(self, principal: Principal, mission: str, seeds: int) -> MissionOut:
         """Have a proposal flown in simulation; one that is being rehearsed goes on.
@@ -282,8 +278,8 @@ class ProposalService:
             wait = math.ceil(_HOUR - (now - begun[0])) if begun else _HOUR
             raise RefusedError(
                 429,
-                f"{account} has had {most} rehearsals within an hour: check documents before "
-                f"(GET /v1/proposals/ID/check), and rehearse again in {wait:.0f} s",
+                f"{account} has had {most} rehearsals within an hour: check documents first, and "
+                f"rehearse again in {wait:.0f} s",
                 retry_after=wait,
             )
         begun.append(now)
@@ -489,6 +485,12 @@ class ProposalService:
             approval=record.approval,
         )
         return found.model_copy(update={"proposal": proposal})
+
+    def approved_hash(self, mission: str) -> str:
+        """Hash by which a mission that is not over was approved; empty for any other."""
+        active = self._table.missions.get(mission)
+        approval = self._record(active).approval if active and active.is_proposal else None
+        return "" if approval is None else approval.hash
 
     def _require_valid(self, active: ActiveMission) -> None:
         """Raise RefusedError for a verdict that says nothing any more; it is forgotten then."""

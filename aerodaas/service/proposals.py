@@ -226,7 +226,7 @@ def summary_of(document: MissionDocument, minutes: float) -> list[str]:
             words = ", ".join(one.replace("_", " ") for one in commands)
             told.append(f"Results of {_named(name, analyses)} may give the command: {words}.")
     if document.sensors:
-        told.append(f"{len(document.sensors)} sensors run: {', '.join(document.sensors)}.")
+        told.append(f"Sensors that run: {', '.join(document.sensors)}.")
     told.append(f"The drones are leased for {minutes:g} min.")
     return told
 

@@ -72,6 +72,7 @@ def build_service(
         audit.write(None, action, proposal.id, told, accepted=True, required=False)
 
     missions.proposals.audit = audit_proposal
+    audit.approved_hash = missions.proposals.approved_hash
     admission = Admission(access, audit)
     shown: dict[str, Any] = catalogue(settings.config).model_dump(mode="json", by_alias=True)
     fleet = FleetView(settings.config, shown, settings.actuators, registry, leases, missions, store)

@@ -13,10 +13,12 @@ import pytest
 from command_line import Ended, ran
 from provider_stub import MISSION, TOKEN, Stub, mission
 
+from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.environment.provider import exchange
 from aerodaas.environment.provider.logins import Logins
 from aerodaas.errors import AeroDaaSError
-from aerodaas.protocol.schemas import MissionPhase
+from aerodaas.protocol.proposals import ProposalOut
+from aerodaas.protocol.schemas import MissionPhase, VerdictOut
 
 APP = """
 import sys
@@ -128,6 +130,32 @@ def test_a_mission_is_cancelled(aerodaas: Command, stub: Stub) -> None:
     stub.state = mission(MissionPhase.CANCELLED)
     assert json.loads(aerodaas("missions", "cancel", MISSION, "--json").out)["phase"] == "cancelled"
     assert len(stub.sent("DELETE", MISSION)) == 2
+
+
+@pytest.mark.parametrize("answer", ["y", "n"])
+def test_a_proposal_is_approved_as_it_is_shown(
+    aerodaas: Command, stub: Stub, monkeypatch: pytest.MonkeyPatch, answer: str
+) -> None:
+    """After a look and a word: by its hash, with the actuators that were named."""
+    proposal = ProposalOut(
+        hash="a" * 64,
+        document=MissionDocument.model_validate({"format": "aerodaas-mission", "version": 1}),
+        minutes=5.0,
+        why="approve\x1b[2Jit",
+        summary=["one flies to 3 waypoints."],
+        difference=["one: waypoint 2 moves."],
+        actuators=["one/hook"],
+    )
+    verdict = VerdictOut(approved=True, seconds=70.0, battery_used=0.25)
+    stub.state = mission(MissionPhase.AWAITING_APPROVAL, proposal=proposal, verdict=verdict)
+    monkeypatch.setattr(sys, "stdin", io.StringIO(f"{answer}\n"))
+    ended = aerodaas("missions", "approve", MISSION, "--actuator", "one/hook")
+    told = ("3 waypoints", "waypoint 2 moves", "one/hook", "70 s", "25%")
+    assert [word for word in told if word not in ended.out] == []
+    assert "\x1b[2J" not in ended.out
+    sent = [json.loads(one) for one in stub.sent("POST", "/approve")]
+    approval = {"hash": "a" * 64, "envelope": None, "actuators": ["one/hook"]}
+    assert (ended.code, sent) == ((0, [approval]) if answer == "y" else (1, []))
 
 
 def test_a_recording_is_fetched_and_nothing_overwritten(

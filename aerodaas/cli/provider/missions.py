@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +19,9 @@ from aerodaas.cli.provider.provider import (
     print_table,
 )
 from aerodaas.errors import ConfigError, MissionError
+from aerodaas.protocol.proposals import ApprovalIn
+from aerodaas.protocol.schemas import MissionOut
+from aerodaas.text.printable import printable
 
 __all__ = ["app"]
 
@@ -30,7 +34,7 @@ app = typer.Typer(
     cls=ExampleGroup,
     no_args_is_help=True,
     rich_markup_mode="markdown",
-    help="""List, watch and cancel missions at a provider, grant their cameras, fetch recordings.
+    help="""List, watch, approve and cancel missions at a provider, grant cameras, fetch recordings.
 
 `aerodaas submit` begins one.
 
@@ -129,6 +133,68 @@ def grant(
         return
     granted = [f"{name} ({', '.join(one) or 'all cameras'})" for name, one in found.grants.items()]
     typer.echo(f"{found.id} shares its cameras with {'; '.join(granted) or 'nobody'}")
+
+
+@app.command()
+def approve(
+    mission: MissionId,
+    actuators: Annotated[
+        list[str] | None,
+        typer.Option("--actuator", metavar="ROBOT/ACTUATOR", help="One that it may move."),
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,  # noqa: FBT002
+    at: At = None,
+    as_json: Json = False,  # noqa: FBT002
+) -> None:
+    """Approve a mission that waits for it, after a look at what would fly.
+
+    A proposal is approved exactly as it is shown; another rehearsal makes it another one.
+
+        aerodaas missions approve 3f1a6c0d9b2e
+        aerodaas missions approve 3f1a6c0d9b2e --actuator quadrotor_base/hook
+    """
+    client = client_at(at)
+    found = client.mission(mission)
+    for line in _told_to_approver(found):
+        typer.echo(line, err=as_json)
+    if not (yes or typer.confirm("Approve it?", err=as_json)):
+        raise MissionError(f"{mission} was not approved")
+    approval = None
+    if found.proposal is not None:
+        approval = ApprovalIn(hash=found.proposal.hash, actuators=actuators or [])
+    found = client.approve(mission, approval)
+    if as_json:
+        print_json(found)
+    else:
+        typer.echo(f"{found.id}: {found.phase.value}: {found.reason}")
+
+
+def _told_to_approver(mission: MissionOut) -> Iterator[str]:
+    """What an approver has to know of a mission, a line each; a stranger's words are marked."""
+    yield f"{mission.id} of {mission.account} ({mission.tenant}): {', '.join(mission.robots)}"
+    if (proposal := mission.proposal) is not None:
+        yield from (f"  {line}" for line in (*proposal.summary, *proposal.records))
+        yield from (f"  moves the actuator {name}" for name in proposal.actuators)
+        yield from (f"  {line}" for line in proposal.difference)
+        if proposal.why:
+            yield f"  its proposer says, and nobody has checked: {printable(proposal.why)!r}"
+    if (verdict := mission.verdict) is None:
+        yield "  not rehearsed"
+        return
+    figures = [
+        f"{value:{form}} {unit}"
+        for value, form, unit in (
+            (verdict.seconds, ".0f", "s"),
+            (verdict.distance, ".0f", "m"),
+            (verdict.battery_used, ".0%", "of the charge"),
+        )
+        if value is not None
+    ]
+    word = "good" if verdict.approved else "not good"
+    yield f"  rehearsal: {word}; {', '.join(figures)}"
+    if (clearance := verdict.clearance) is not None:
+        place = ", ".join(f"{axis:.1f}" for axis in clearance.place)
+        yield f"  nearest object: {clearance.distance:.1f} m, {clearance.label}, at ({place})"
 
 
 @app.command()

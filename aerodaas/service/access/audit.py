@@ -36,6 +36,8 @@ class Audit:
         self._clock = clock
         self._most = most
         self._lock = threading.Lock()
+        self.approved_hash: Callable[[str], str] = lambda _mission: ""
+        """Tells the hash by which a mission was approved; empty for one that was not proposed."""
         self._late: deque[AuditEntry] = deque(maxlen=_MOST_LATE)
 
     def write(
@@ -98,8 +100,9 @@ class Audit:
             target: What it was given to.
             answer: What the drone said.
         """
-        said, accepted = answer.text, answer.accepted
-        self.write(who, f"mission.{action}", target, said, accepted=accepted, required=False)
+        said = f"{self.approved_hash(target.partition('/')[0])} {answer.text}".strip()
+        action, accepted = f"mission.{action}", answer.accepted
+        self.write(who, action, target, said, accepted=accepted, required=False)
 
     def newest(self, limit: int) -> list[AuditEntry]:
         """The newest entries, at most `limit`, newest first; raises StoreError."""

@@ -53,8 +53,8 @@ def require(
 
 
 _REMEDY = (
-    "it proposes missions (POST /v1/proposals), which an operator approves, and stops those that "
-    "fly (pause, return-home, land)"
+    "it proposes missions, which an operator approves, and stops those that fly (pause, "
+    "return-home, land)"
 )
 
 
