@@ -9,6 +9,7 @@ from aerodaas.errors import ConfigError
 __all__ = ["has_extra", "require_extra"]
 
 _PACKAGES = {
+    "agents": ("mcp",),
     "evaluation": ("pycocotools", "yaml"),
     "logs": ("pyulog",),
     "notebook": ("pandas",),
@@ -31,8 +32,8 @@ def require_extra(extra: str, purpose: str) -> None:
     """Require the packages of an extra.
 
     Args:
-        extra: `evaluation`, `logs`, `notebook`, `plots`, `remote`, `ros`, `routing`, `service`
-            or `terrain`.
+        extra: `agents`, `evaluation`, `logs`, `notebook`, `plots`, `remote`, `ros`, `routing`,
+            `service` or `terrain`.
         purpose: The feature, as the subject of the error's sentence, in the singular.
 
     Raises:

@@ -8,6 +8,7 @@ from typing import Any
 
 from fastapi import FastAPI
 
+from aerodaas.config.extensions import service
 from aerodaas.config.redaction import catalogue
 from aerodaas.service.access.accounts import Access, Accounts
 from aerodaas.service.access.audit import Audit
@@ -42,7 +43,10 @@ __all__ = ["build_service"]
 
 
 def build_service(
-    settings: ServiceSettings, store: Store, tell: Callable[[str], None] = lambda _: None
+    settings: ServiceSettings,
+    store: Store,
+    tell: Callable[[str], None] = lambda _: None,
+    address: str = "",
 ) -> FastAPI:
     """Build the service; its missions move on while the application runs.
 
@@ -50,6 +54,7 @@ def build_service(
         settings: Of the provider.
         store: Its open database.
         tell: Tells the provider's people of what they should look at.
+        address: Where this machine reaches it without TLS, for the agents' endpoint.
     """
     audit = Audit(store)
     issuer = None if settings.oidc is None else OidcVerifier(settings.oidc)
@@ -113,4 +118,7 @@ def build_service(
         [*extension_routers(missions, admission), *(one.router() for one in routes)],
         tiles=settings.config.map_tiles,
         running=running,
+        endpoint=service("agents.endpoint")(admission, settings, address)
+        if settings.agents
+        else None,
     )

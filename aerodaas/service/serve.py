@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from aerodaas.config.model import EnvironmentConfig
@@ -54,21 +55,25 @@ def serve(
     _require_own_links(settings.config)
     settings.state.mkdir(parents=True, exist_ok=True, mode=0o700)
     settings.state.chmod(0o700)
-    listener = _bound(host, port)
+    listeners = [_bound(host, port)]
     with Store.open(database or settings.state / "service.db") as store:
         token = Accounts(store).first_token()
         if token is not None:
             tell(f"the administrator's token, shown this once: {token}")
         scheme = "https" if certificate is not None else "http"
-        where = f"[{host}]" if ":" in host else host
-        tell(f"serving {settings.config.name} at {scheme}://{where}:{listener.getsockname()[1]}")
+        where = f"{scheme}://{f'[{host}]' if ':' in host else host}:{_port(listeners[0])}"
+        tell(f"serving {settings.config.name} at {where}")
+        if settings.agents and certificate is not None:
+            # What agents ask goes to the API itself, and the certificate is of another name.
+            listeners.append(_bound("127.0.0.1", 0))
+        inner = where if certificate is None else f"http://127.0.0.1:{_port(listeners[-1])}"
         web_server(
-            build_service(settings, store, tell),
+            build_service(replace(settings, public=settings.public or where), store, tell, inner),
             PROVIDER,
             ssl_certfile=certificate,
             ssl_keyfile=key,
             timeout_graceful_shutdown=2,
-        ).run(sockets=[listener])
+        ).run(sockets=listeners)
 
 
 def _require_own_links(config: EnvironmentConfig) -> None:
@@ -82,6 +87,11 @@ def _require_own_links(config: EnvironmentConfig) -> None:
                 "itself: a service leases them one by one, so give each a port of its own; a "
                 "MAVLink router does that"
             )
+
+
+def _port(listener: socket.socket) -> int:
+    port: int = listener.getsockname()[1]
+    return port
 
 
 def _bound(host: str, port: int) -> socket.socket:

@@ -55,6 +55,10 @@ class ServiceSettings:
     """Most flights at once."""
     most_open: int = 50
     """Most missions of one tenant that are not over."""
+    agents: bool = False
+    """Agents may come by their own protocol, too (`service("agents.endpoint")`)."""
+    public: str | None = None
+    """Address by which users reach the service through a proxy; None: where it listens."""
 
     @property
     def models(self) -> Path:

@@ -66,6 +66,13 @@ def serve(
             help="An actuator that a tenant's missions may move. Default: none; never a parachute.",
         ),
     ] = None,
+    agents: Annotated[  # noqa: FBT002 - as above
+        bool, typer.Option("--agents", help="Let agents propose missions at /mcp, too.")
+    ] = False,
+    public_url: Annotated[
+        str | None,
+        typer.Option(metavar="URL", help="Address by which users reach it through a proxy."),
+    ] = None,
     address: Annotated[str | None, typer.Option(help="Ray cluster that flights join.")] = None,
     oidc_issuer: Annotated[
         str | None,
@@ -99,6 +106,8 @@ def serve(
     from aerodaas.config.extras import require_extra  # noqa: PLC0415 - only to serve
 
     require_extra("service", "aerodaas serve")
+    if agents:
+        require_extra("agents", "aerodaas serve --agents")
     from aerodaas.config.model import EnvironmentConfig  # noqa: PLC0415
     from aerodaas.config.overrides import located  # noqa: PLC0415
     from aerodaas.service.serve import serve as run  # noqa: PLC0415 - slow to load
@@ -117,6 +126,8 @@ def serve(
         most_attached=most_attached,
         edge_slots=edge_slots,
         actuators=_actuators(actuator or (), config),
+        agents=agents,
+        public=public_url,
         address=address,
         oidc=_oidc(
             oidc_issuer,

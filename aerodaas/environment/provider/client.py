@@ -21,6 +21,7 @@ from aerodaas.messages.health import HealthReport
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
 from aerodaas.protocol.proposals import ApprovalIn, ChangeIn, CheckReport, ProposalIn, RehearseIn
+from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     AccountIn,
     AccountOut,
@@ -99,6 +100,10 @@ class ProviderClient:
     def fleet(self) -> FleetOut:
         """The drones, and the environment that applications are built against."""
         return self._ask(FleetOut, "GET", "/v1/fleet")
+
+    def fleet_scenery(self) -> SceneryOut:
+        """Ground below the fleet: what stands in a simulated world, or tiles of the Earth."""
+        return self._ask(SceneryOut, "GET", "/v1/fleet/scenery")
 
     def preflight(self, robot: str) -> HealthReport:
         """A drone's health before take-off, as it was when it was looked at last."""

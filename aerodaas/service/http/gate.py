@@ -20,7 +20,7 @@ from aerodaas.mission.commands import Answer
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access.principal import Principal, require
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.http.limits import RateLimiter, RequestLimits
+from aerodaas.service.http.limits import AGENTS_PATH, RateLimiter, RequestLimits
 from aerodaas.service.http.page import PAGE_PATHS
 from aerodaas.service.http.refusals import refuse
 
@@ -270,8 +270,9 @@ class LimitsMiddleware:
                 await asyncio.to_thread(self._admission.require, connection, Role.PILOT)
             limits: dict[tuple[str, str], int] = {}
             if not sender.role.reaches(self._limits.reserved):
+                kind = "agents" if scope["path"] == AGENTS_PATH else scope["type"]
                 limits = self._limits.at_a_time(
-                    scope["type"], sender.account, address_of(scope), large=large
+                    kind, sender.account, address_of(scope), large=large
                 )
             for (kind, owner), limit in limits.items():
                 if self._counts[kind, owner] >= limit:

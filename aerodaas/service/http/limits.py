@@ -15,7 +15,18 @@ from aerodaas.analytics.here.relay import LARGEST_ANSWER
 from aerodaas.protocol.schemas import Role
 from aerodaas.service.errors import RefusedError
 
-__all__ = ["LEASED_FLIGHT", "OWN_FLIGHT", "PROVIDER", "RateLimiter", "RequestLimits", "WrongTokens"]
+__all__ = [
+    "AGENTS_PATH",
+    "LEASED_FLIGHT",
+    "OWN_FLIGHT",
+    "PROVIDER",
+    "RateLimiter",
+    "RequestLimits",
+    "WrongTokens",
+]
+
+AGENTS_PATH = "/mcp"
+"""Path at which agents come by their own protocol."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +73,10 @@ class RequestLimits:
     """Requests of one account at a time: further ones would keep others' commands waiting."""
     account_large_requests: ClassVar[int] = 2
     """Requests of one account at a time with a body of more than `large_bytes`."""
+    account_agents: ClassVar[int] = 64
+    """Calls of one agent at a time, which mostly wait; what each asks is a request of its own."""
+    agents: ClassVar[int] = 256
+    """The same of all agents."""
     requests: ClassVar[int] = 160
     """Requests at a time of all accounts below `reserved`, for which threads are left."""
     large_requests: ClassVar[int] = 16
@@ -113,7 +128,7 @@ class RequestLimits:
 
     def body_bytes(self, path: str) -> int:
         """Bytes that the body of a request for `path` may have."""
-        if path in {"/v1/missions", "/v1/proposals"}:
+        if path in {"/v1/missions", "/v1/proposals", AGENTS_PATH}:
             return self.submission_bytes
         if path.startswith("/v1/missions/"):
             return self.command_bytes
@@ -125,7 +140,7 @@ class RequestLimits:
         """Limits of one request below `reserved`, by what it counts as and by whose it is.
 
         Args:
-            kind: `http` or `websocket`.
+            kind: `http`, `websocket`, or `agents` for a call at `AGENTS_PATH`.
             account: Account that sends the request.
             address: Address that it comes from.
             large: Whether its body has more than `large_bytes`.
@@ -139,6 +154,8 @@ class RequestLimits:
                 ("live views", address): self.address_views,
                 ("live views", ""): self.views,
             }
+        if kind == "agents":
+            return {("calls", account): self.account_agents, ("calls", ""): self.agents}
         limits = {("requests", account): self.account_requests, ("requests", ""): self.requests}
         if large:
             limits["large requests", account] = self.account_large_requests
