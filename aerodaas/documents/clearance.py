@@ -8,15 +8,14 @@ from itertools import pairwise
 
 from aerodaas.config.model import SimulationConfig
 from aerodaas.geometry.frames import Vector, length
-from aerodaas.simulation.collision import Nearest, Obstacles
+from aerodaas.simulation.collision import CLEARANCE, Nearest, Obstacles
 from aerodaas.simulation.scenario import Person
 from aerodaas.simulation.world import World
 
 __all__ = ["StandingObstacles", "TooNear"]
 
-_FROM_THINGS = 0.5
-"""Metres that a drone's way keeps from whatever stands."""
 _FROM_PEOPLE = 2.0
+"""Metres that a drone's way keeps from people who stand."""
 _SHORTEST = 0.1
 """Metres between two places of a way at which is looked, at least."""
 
@@ -41,7 +40,7 @@ class StandingObstacles:
         people = {thing.id for thing in world.things if isinstance(thing.spec, Person)}
         self._obstacles = Obstacles(world)
         self._searches = (
-            (_FROM_THINGS, frozenset(moving | people)),
+            (CLEARANCE, frozenset(moving | people)),
             (_FROM_PEOPLE, frozenset({thing.id for thing in world.things} - people | moving)),
         )
         """Distances that are kept, and what each one does not concern."""

@@ -70,7 +70,7 @@ class SimulatedVehicle:
         )
         self._max_yaw_rate = math.radians(limits.max_yaw_rate)
         self._wind = math.hypot(*simulation.wind[:2])
-        terrain = _terrain(robot, environment)
+        terrain = Ground.around(robot, environment)
         wind = Wind(simulation.wind, simulation.gust, f"{simulation.seed}/{robot.id}/wind", STEP)
         self._rotor = Multirotor(
             airframe,
@@ -282,17 +282,6 @@ class SimulatedVehicle:
             raise VehicleError(f"{self._name} cannot {deed} on the ground; take off first")
         if self._autopilot.mode is VehicleMode.FAILSAFE:
             raise VehicleError(f"{self._name} cannot {deed}: it is landing on its last charge")
-
-
-def _terrain(robot: RobotConfig, environment: EnvironmentConfig) -> Ground | None:
-    """The ground around its start; None for a flat one.
-
-    Raises ConfigError for a terrain that cannot be read.
-    """
-    home, terrain = environment.home, environment.terrain
-    if home is None or terrain is None:
-        return None
-    return Ground.of(terrain, home.origin, np.array(robot.start), robot.limits.max_range)
 
 
 def _rangefinder(

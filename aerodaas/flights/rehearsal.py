@@ -7,6 +7,7 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import psutil
@@ -17,7 +18,7 @@ from aerodaas.flights.process import FlightProcess
 from aerodaas.protocol.schemas import VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.orders import FlightOrder, Outcome
-from aerodaas.service.rehearsal.findings import judge
+from aerodaas.service.rehearsal.findings import judge, together
 from aerodaas.service.rehearsal.picture import draw
 
 __all__ = ["rehearse"]
@@ -35,26 +36,61 @@ def rehearse(path: Path) -> None:
     order = FlightOrder.read(folder.order)
     os.chdir(folder.path)
     with folder.claim():
-        flying = FlightProcess(folder, order)
         threading.Thread(target=_watch, args=(folder, order), daemon=True).start()
-        outcome = flying.outcome()
-        verdict = _verdict(folder, order, flying, outcome)
-        # The verdict and its picture are all that is kept of it.
-        folder.recording.unlink(missing_ok=True)
-        folder.end(outcome.model_copy(update={"verdict": verdict}))
+        outcomes: list[Outcome] = []
+        verdicts: list[VerdictOut] = []
+        for seeds in [[seed] for seed in order.seeds] or [[]]:
+            outcome, verdict = _fly(folder, order, seeds, verdicts)
+            outcomes.append(outcome)
+            verdicts.append(verdict)
+        verdict = together(verdicts)
+        here = ", ".join(read_mission(folder.document).here)
+        if here:
+            told = f"rehearsed without what runs at the user's side: {here}"
+            verdict = verdict.model_copy(update={"reasons": [*verdict.reasons, told]})
+        shown = next((n for n, one in enumerate(verdicts) if not one.approved), 0)
+        folder.end(outcomes[shown].model_copy(update={"verdict": verdict}))
+
+
+def _fly(
+    folder: FlightFolder, order: FlightOrder, seeds: list[int], before: Sequence[VerdictOut]
+) -> tuple[Outcome, VerdictOut]:
+    """Fly the order with its next seed, and judge the flight.
+
+    The picture shows the first flight that is refused, or else the first one.
+    """
+    flying = FlightProcess(folder, order.model_copy(update={"seeds": seeds}))
+    outcome = flying.outcome()
+    if not folder.recording.is_file():
+        return outcome, VerdictOut(approved=False, reasons=[outcome.reason], seeds=seeds)
+    minutes, others = order.minutes, order.others
+    try:
+        verdict = judge(folder.recording, flying.config, minutes=minutes, others=others)
+        if not before or (not verdict.approved and all(one.approved for one in before)):
+            # The picture is for people; a flight is not refused for want of it.
+            with contextlib.suppress(AeroDaaSError):
+                draw(
+                    folder.recording, folder.picture, flying.config, minutes=minutes, others=others
+                )
+    except AeroDaaSError as error:
+        text = f"the rehearsal could not be judged: {error}"
+        verdict = VerdictOut(approved=False, reasons=[text], seeds=seeds)
+    # The verdict and its picture are all that is kept of it.
+    folder.recording.unlink(missing_ok=True)
+    return outcome, verdict
 
 
 def _watch(folder: FlightFolder, order: FlightOrder) -> None:
     """End the process of a rehearsal that uses too much."""
     process = psutil.Process()
+    most = order.rehearsal_seconds * max(1, len(order.seeds))
     while True:
         time.sleep(_LOOK_SECONDS)
         processor, memory = time.process_time(), process.memory_info()
         reason = ""
-        if processor > order.rehearsal_seconds:
+        if processor > most:
             reason = (
-                f"its rehearsal used more than {order.rehearsal_seconds:g} s of a processor: "
-                "submit a shorter mission"
+                f"its rehearsal used more than {most:g} s of a processor: submit a shorter mission"
             )
         elif memory.rss - memory.shared > order.rehearsal_bytes:
             reason = (
@@ -68,25 +104,3 @@ def _watch(folder: FlightFolder, order: FlightOrder) -> None:
                 Outcome(landed=False, reason=reason, began=ended, ended=ended, verdict=verdict)
             )
             os.kill(os.getpid(), signal.SIGKILL)
-
-
-def _verdict(
-    folder: FlightFolder, order: FlightOrder, flying: FlightProcess, outcome: Outcome
-) -> VerdictOut:
-    if not folder.recording.is_file():
-        return VerdictOut(approved=False, reasons=[outcome.reason])
-    config = flying.config
-    try:
-        verdict = judge(folder.recording, config, minutes=order.minutes, others=order.others)
-        # The picture is for people; a flight is not refused for want of it.
-        with contextlib.suppress(AeroDaaSError):
-            draw(
-                folder.recording, folder.picture, config, minutes=order.minutes, others=order.others
-            )
-    except AeroDaaSError as error:
-        return VerdictOut(approved=False, reasons=[f"the rehearsal could not be judged: {error}"])
-    here = ", ".join(read_mission(folder.document).here)
-    if here:
-        told = f"rehearsed without what runs at the user's side: {here}"
-        return verdict.model_copy(update={"reasons": [*verdict.reasons, told]})
-    return verdict

@@ -102,6 +102,7 @@ class ActiveMission:
         self._flying: subprocess.Popen[bytes] | None = None
         """Processes that this service has started; the flight's is never ended from here."""
         self._rehearsed_since = time.monotonic()
+        self._rehearsed_flights = 1
         self._known_lease: FlightLeaseIn | None = None
         """The last state of its lease that its flight was told."""
         self._missed_lease: tuple[FlightLeaseIn, int] | None = None
@@ -187,6 +188,7 @@ class ActiveMission:
         self._prepare(self.rehearsal, order, models)
         self._rehearsing = start_process(self.rehearsal, tied=True, vehicles=False)
         self._rehearsed_since = time.monotonic()
+        self._rehearsed_flights = max(1, len(order.seeds))
 
     def forget_rehearsal(self) -> None:
         """End the rehearsal, and remove all that it has left."""
@@ -194,7 +196,11 @@ class ActiveMission:
         shutil.rmtree(self.rehearsal.path, ignore_errors=True)
 
     def verdict(self, seconds: float) -> VerdictOut | None:
-        """The rehearsal's verdict; None while it goes on, at most so many wall seconds."""
+        """The rehearsal's verdict; None while it goes on.
+
+        `seconds` are the most wall seconds of each of its flights.
+        """
+        seconds *= self._rehearsed_flights
         ended = self._rehearsing is None or self._rehearsing.poll() is not None
         if not ended or self.rehearsal.flying:
             if time.monotonic() - self._rehearsed_since < seconds:

@@ -27,7 +27,7 @@ from aerodaas.simulation.world import (
     rng_of,
 )
 
-__all__ = ["BODY", "Nearest", "Obstacles"]
+__all__ = ["BODY", "CLEARANCE", "Nearest", "Obstacles"]
 
 Triple: TypeAlias = tuple[float, float, float]
 _Shape: TypeAlias = Callable[[float, float, float], Triple]
@@ -35,6 +35,9 @@ _Shape: TypeAlias = Callable[[float, float, float], Triple]
 
 BODY = 0.2
 """Metres around the drone's centre that must stay free: its body with the rotors."""
+CLEARANCE = 0.5
+"""Metres around the drone's centre that a good way keeps free: its body, and 0.3 m by which a
+position is wrong or a gust carries it off."""
 _TALL, _WIDE = 3.2, 2.6
 """Metres up and around a person's or car's place within which all of it is."""
 _SLICES = 12

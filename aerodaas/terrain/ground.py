@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from aerodaas.config.model import TerrainConfig
+from aerodaas.config.model import EnvironmentConfig, RobotConfig, TerrainConfig
 from aerodaas.errors import ConfigError
 from aerodaas.geometry.frames import GeodeticOrigin, Vector
 from aerodaas.terrain.terrain import Terrain
@@ -75,6 +75,22 @@ class Ground:
         if math.isnan(at_takeoff):
             raise ConfigError(f"at the take-off, {self.why_unknown(*takeoff[:2])}")
         self._zero = at_takeoff - float(takeoff[2])
+
+    @classmethod
+    def around(cls, robot: RobotConfig, environment: EnvironmentConfig) -> Ground | None:
+        """The ground around the start of a simulated robot; None for a flat one.
+
+        Args:
+            robot: The robot, which stands on it.
+            environment: Its home and terrain.
+
+        Raises:
+            ConfigError: For a terrain that cannot be read.
+        """
+        home, terrain = environment.home, environment.terrain
+        if home is None or terrain is None:
+            return None
+        return cls.of(terrain, home.origin, np.array(robot.start), robot.limits.max_range)
 
     def _pin(self, origin: GeodeticOrigin) -> None:
         """Prepare the conversion to degrees around `origin`."""

@@ -74,11 +74,13 @@ def rehearse(
     limits: Mapping[str, Any] | None = None,
     driver: str = "simulated",
     battery: float = 1.0,
+    world: str = "empty",
 ) -> Rehearsal:
     """Fly the rehearsal of a mission in the field, with further `limits`."""
     drone = {**FIELD["robots"][0], "driver": driver}
     drone["limits"] = {**drone["limits"], **(limits or {})}
-    config = validated({**FIELD, "robots": [drone]}, "the field")
+    simulation = {"world": world}
+    config = validated({**FIELD, "robots": [drone], "simulation": simulation}, "the field")
     config = rehearsal_config(config, {"drone": battery}, seed=5)
     # A flight that fails has a recording, too.
     with contextlib.suppress(MissionError):

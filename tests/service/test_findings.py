@@ -9,9 +9,11 @@ from typing import Any
 import pytest
 
 from aerodaas.config.model import EnvironmentConfig, validated
+from aerodaas.protocol.proposals import ClearanceOut
+from aerodaas.protocol.schemas import VerdictOut
 from aerodaas.recording.report.flight import Band, RecordedFlight, RobotFlight
 from aerodaas.service.flights.orders import OtherLease
-from aerodaas.service.rehearsal.findings import Finding, findings_of
+from aerodaas.service.rehearsal.findings import Finding, findings_of, together
 
 FENCE = {"polygon": [[-20, -20], [20, -20], [20, 20], [-20, 20]], "ceiling": 30}
 
@@ -139,6 +141,54 @@ def test_a_drone_on_the_ground_is_nobodys_danger() -> None:
     flight = flown(ROUND)
     flight.robots["drone"].states.append((40.0, 25.0, 25.0, 0.0, 0.9))
     assert reasons(flight, others=[box(24.0, 24.0)]) == []
+
+
+@pytest.mark.parametrize(
+    ("distance", "told"), [(0.0, "hit building barn at"), (0.49, "came to 0.49 m"), (0.5, "")]
+)
+def test_things_are_kept_away_from(distance: float, told: str) -> None:
+    """With the place, the height and the distance that is to be kept."""
+    near = ClearanceOut(
+        distance=distance,
+        thing="barn",
+        label="building",
+        robot="drone",
+        place=(10.0, 4.0, 2.0),
+        time=14.0,
+    )
+    found = findings_of(flown(ROUND), field(), minutes=1, nearest=[near])
+    assert bool(found) == bool(told)
+    for one in found:
+        assert told in one.text
+        assert "(10.0, 4.0), 2.0 m up, after 14.0 s, and 0.5 m are to be kept: fly" in one.text
+        assert one.place == (10.0, 4.0)
+
+
+def verdict(seed: int, *reasons: str, **fields: Any) -> VerdictOut:  # noqa: ANN401
+    """Of a flight with this seed."""
+    return VerdictOut(approved=not reasons, reasons=list(reasons), seeds=[seed], **fields)
+
+
+def near(distance: float) -> ClearanceOut:
+    """Of a drone to a barn."""
+    names = {"thing": "barn", "label": "building", "robot": "drone"}
+    return ClearanceOut(distance=distance, place=(0.0, 0.0, 2.0), time=1.0, **names)
+
+
+def test_flights_are_judged_together() -> None:
+    """Each has to be good; a reason of some names their seeds, and the worst figures count."""
+    good = [verdict(1, seconds=40.0, clearance=near(1.2)), verdict(2, clearance=near(0.7))]
+    both = together(good)
+    assert (both.approved, both.reasons, both.seeds) == (True, [], [1, 2])
+    assert both.clearance == near(0.7)
+    assert both.seconds == 40.0
+    assert together([verdict(1), verdict(2)]).clearance is None
+    bad = together([verdict(1, "late"), verdict(2, "late", "low"), verdict(3, "late", "low")])
+    assert not bad.approved
+    assert bad.reasons == ["late", "seed 2, 3: low"]
+    one = verdict(4, "late")
+    assert together([one]) == one
+    assert not together([verdict(1), verdict(2, "late")]).approved
 
 
 def test_alerts_of_failures_are_reasons_and_results_are_not() -> None:

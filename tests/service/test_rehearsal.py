@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,16 @@ import cv2
 import numpy as np
 import pytest
 from flying import Flyer
-from rehearsed import rehearse, to_the_east
+from rehearsed import FIELD, rehearse, to_the_east
 
+from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
 from aerodaas.config.model import validated
 from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.errors import ConfigError
 from aerodaas.messages.health import Verdict
 from aerodaas.mission.safety.checklist import Checklist
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.service.flights.environment import rehearsal_config
 from aerodaas.service.flights.orders import OtherLease
 from aerodaas.service.rehearsal.findings import judge
@@ -176,3 +180,63 @@ def test_a_drone_that_does_not_take_off_is_refused(flyer: Flyer) -> None:
     assert not verdict.approved
     assert "did not land as planned: aborted: take-off refused" in verdict.reasons[0]
     assert verdict.seconds is None
+
+
+def straight_to(*places: tuple[float, float], height: float) -> Callable[[Environment], None]:
+    """A mission straight to these places."""
+
+    def build(env: Environment) -> None:
+        stops = [Waypoint(f"wp{n}", x, y, height) for n, (x, y) in enumerate(places)]
+        env.get_robot_by_id("drone").navigate(AeroNavigation(NavigationType.DISTANCE_DRIVEN, stops))
+
+    return build
+
+
+def test_a_flight_into_a_barn_is_refused(flyer: Flyer) -> None:
+    """It ends there, and each reason names what was hit and where."""
+    flown = rehearse(flyer, straight_to((24, 17), height=2.0), world="field")
+    verdict = judge(flown.recording, flown.config, minutes=5)
+    assert not verdict.approved
+    assert verdict.clearance is not None
+    assert (verdict.clearance.distance, verdict.clearance.thing) == (0.0, "barn")
+    assert verdict.seeds == [5]
+    ended, hit = verdict.reasons
+    assert "aborted: collision with building barn at (2" in ended
+    assert hit.startswith("drone hit building barn at (2")
+    with Recording.open(flown.recording) as recording:
+        alerts = RecordedFlight.read(recording).alerts
+    (collision,) = [text for _, kind, text in alerts if kind == "collision"]
+    assert collision in ended
+
+
+@pytest.mark.parametrize(("height", "approved"), [(1.4, False), (1.9, True)])
+def test_a_flight_past_a_fence_tells_how_near_it_came(
+    flyer: Flyer, height: float, *, approved: bool
+) -> None:
+    """By the true positions, between take-off and landing; above 0.5 m it is good."""
+    flown = rehearse(flyer, straight_to((5, 5), (16, 5), height=height), world="field")
+    verdict = judge(flown.recording, flown.config, minutes=5)
+    assert verdict.approved is approved
+    near = verdict.clearance
+    assert near is not None
+    assert (near.thing, near.label, near.robot) == ("fence", "fence", "drone")
+    assert near.distance == pytest.approx(height - 1.1, abs=0.15)
+    assert near.place[0] == pytest.approx(14.0, abs=0.5)
+
+
+def test_what_stands_beside_the_start_is_no_near_miss(flyer: Flyer) -> None:
+    """A drone takes off and lands within half a metre of a fence; in an empty world is none."""
+    drone = {**FIELD["robots"][0], "start": [13.5, 5.0, 0.0]}
+    config = {**FIELD, "robots": [drone], "simulation": {"world": "field"}}
+    flyer.fly(straight_to((-6, 0), height=3.0), config, seed=5)
+    (recording,) = flyer.folder.glob("flight/*.mcap")
+    verdict = judge(recording, validated(config, "the field"), minutes=5)
+    assert verdict.reasons == []
+    assert verdict.clearance is not None
+    assert verdict.clearance.distance > 0.5
+
+
+def test_an_empty_world_has_no_clearance(flyer: Flyer) -> None:
+    """Nothing is near."""
+    flown = rehearse(flyer)
+    assert judge(flown.recording, flown.config, minutes=2).clearance is None

@@ -45,7 +45,7 @@ def test_a_rehearsal_ends_with_the_service_that_is_killed() -> None:
         assert found["phase"] == "awaiting_approval", found["reason"]
 
 
-def rehearse(folder: Path, **bounds: float) -> tuple[FlightFolder, int]:
+def rehearse(folder: Path, **bounds: object) -> tuple[FlightFolder, int]:
     """Run the process of a rehearsal to its end; returns its folder and exit code."""
     path = folder / "fleet.json"
     path.write_text(json.dumps(fleet(robot("one", endurance=3600))), encoding="utf-8")
@@ -83,3 +83,15 @@ def test_a_rehearsal_within_its_bounds_is_approved(tmp_path: Path) -> None:
     assert outcome is not None
     assert outcome.verdict is not None
     assert outcome.verdict.approved, outcome.verdict.reasons
+
+
+def test_each_seed_is_flown_and_judged(tmp_path: Path) -> None:
+    """One verdict tells the seeds of all flights, and one picture is drawn."""
+    made, code = rehearse(tmp_path, seeds=[3, 4])
+    outcome = made.outcome()
+    assert code == 0
+    assert outcome is not None
+    assert outcome.verdict is not None
+    assert outcome.verdict.approved, outcome.verdict.reasons
+    assert outcome.verdict.seeds == [3, 4]
+    assert not made.recording.exists()

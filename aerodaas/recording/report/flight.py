@@ -113,6 +113,8 @@ class RobotFlight:
 
     states: list[tuple[float, float, float, float, float]] = field(default_factory=list)
     """Mission seconds, east, north and up in metres, battery 0 to 1."""
+    truth: list[tuple[float, float, float, float]] = field(default_factory=list)
+    """Mission seconds, true east, north and up in metres, of a simulated drone."""
     bands: list[Band] = field(default_factory=list)
     plan: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     """All waypoints planned during the flight, by id, local ENU metres."""
@@ -252,8 +254,10 @@ def _closed(robot: RobotFlight) -> Iterator[Band]:
 def _state(flight: RecordedFlight, record: Record) -> None:
     state: VehicleState = record.value
     place = map(float, state.odometry.position)
-    row = (seconds(state.stamp), *place, state.battery.fraction)
-    flight.robots[record.labels.robot].states.append(row)  # type: ignore[arg-type]
+    robot, now = flight.robots[record.labels.robot], seconds(state.stamp)
+    robot.states.append((now, *place, state.battery.fraction))  # type: ignore[arg-type]
+    if state.truth is not None:
+        robot.truth.append((now, *map(float, state.truth.position)))  # type: ignore[arg-type]
 
 
 def _mission(flight: RecordedFlight, record: Record) -> None:

@@ -13,14 +13,16 @@ from numpy.typing import NDArray
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.messages.mission import Place
 from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.protocol.proposals import ClearanceOut
 from aerodaas.protocol.schemas import VerdictOut
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
 from aerodaas.service.flights.orders import OtherLease
+from aerodaas.service.rehearsal.clearance import ON_GROUND, clearances
+from aerodaas.simulation.collision import CLEARANCE
 
-__all__ = ["Finding", "findings_of", "judge"]
+__all__ = ["Finding", "findings_of", "judge", "together"]
 
-_GROUND = ("", "idle", "preflight", "landed", "aborted")
 _BOUNDARIES = {
     "geofence": "the fence",
     "ceiling": "the greatest height",
@@ -70,6 +72,7 @@ def findings_of(
     *,
     minutes: float,
     others: Sequence[OtherLease] = (),
+    nearest: Iterable[ClearanceOut] = (),
 ) -> list[Finding]:
     """All reasons to refuse a flight; empty if there is none.
 
@@ -78,6 +81,7 @@ def findings_of(
         config: Environment that it flew in.
         minutes: Of the lease.
         others: Areas of all other granted leases.
+        nearest: Smallest distance of each robot from an object, see `clearances`.
     """
     found: list[Finding] = []
     known = {robot.id: robot for robot in config.robots}
@@ -86,6 +90,7 @@ def findings_of(
         return [Finding("no drone has flown: navigate one in the mission")]
     for name in flown:
         found += _RobotFindings(known[name], flight.robots[name], minutes).all(others)
+    found += _near_misses(nearest)
     found += _alerts(flight.alerts)
     return found
 
@@ -98,7 +103,7 @@ def _landing_time(robot: RobotFlight) -> float | None:
 
 def _flown(flight: RobotFlight) -> NDArray[np.float64]:
     """Positions of a robot in the air, shape (N, 3)."""
-    return flight.position[~np.isin(np.array(flight.state_at(flight.time)), _GROUND)]
+    return flight.position[~np.isin(np.array(flight.state_at(flight.time)), ON_GROUND)]
 
 
 def _track(flight: RobotFlight) -> list[Place]:
@@ -221,6 +226,21 @@ class _RobotFindings:
         return _pair(self._flight.position[-1]) if len(self._flight.states) else None
 
 
+def _near_misses(nearest: Iterable[ClearanceOut]) -> Iterator[Finding]:
+    for one in nearest:
+        if one.distance >= CLEARANCE:
+            continue
+        what, place = f"{one.label} {one.thing}", _place(one.place)
+        event = (
+            f"hit {what}" if one.distance <= 0.0 else f"came to {one.distance:.1f} m from {what}"
+        )
+        yield Finding(
+            f"{one.robot} {event} at {place}, {one.place[2]:.1f} m up, after {one.time:.1f} s, and "
+            f"{CLEARANCE:g} m are to be kept: fly around it or higher",
+            one.place[:2],
+        )
+
+
 def _alerts(alerts: Iterable[tuple[float, str, str]]) -> Iterator[Finding]:
     told = set()
     for at, kind, text in alerts:
@@ -235,6 +255,45 @@ def _pair(position: NDArray[np.float64]) -> tuple[float, float]:
 
 def _place(position: Sequence[float] | NDArray[np.float64]) -> str:
     return f"({position[0]:.1f}, {position[1]:.1f})"
+
+
+def together(verdicts: Sequence[VerdictOut]) -> VerdictOut:
+    """The verdict of several flights, each with another seed.
+
+    It is approved if all of them are. A reason that some flights lack names the seeds of those that
+    have it. Times, distances and charges are the greatest ones, the clearance is the smallest.
+
+    Args:
+        verdicts: Of the flights, one at least.
+    """
+    if len(verdicts) == 1:
+        return verdicts[0]
+    seeds: dict[str, list[int]] = {}
+    for one in verdicts:
+        for reason in one.reasons:
+            seeds.setdefault(reason, []).extend(one.seeds)
+    reasons = [
+        reason if len(of) == len(verdicts) else f"seed {', '.join(map(str, of))}: {reason}"
+        for reason, of in seeds.items()
+    ]
+    near = [one.clearance for one in verdicts if one.clearance is not None]
+    # The way that is drawn is the one of the picture.
+    shown = next((one for one in verdicts if not one.approved), verdicts[0])
+    return shown.model_copy(
+        update={
+            "approved": all(one.approved for one in verdicts),
+            "reasons": reasons,
+            "seconds": _greatest(one.seconds for one in verdicts),
+            "distance": _greatest(one.distance for one in verdicts),
+            "battery_used": _greatest(one.battery_used for one in verdicts),
+            "seeds": [seed for one in verdicts for seed in one.seeds],
+            "clearance": min(near, key=lambda one: one.distance, default=None),
+        }
+    )
+
+
+def _greatest(values: Iterable[float | None]) -> float | None:
+    return max((value for value in values if value is not None), default=None)
 
 
 def judge(
@@ -258,11 +317,13 @@ def judge(
 
     Raises:
         RecordingError: If the recording cannot be read.
-        ConfigError: If a robot's fence is invalid.
+        ConfigError: If a robot's fence, the world or the terrain is invalid.
     """
     with Recording.open(recording) as opened:
         flight, whole = RecordedFlight.read(opened), opened.complete and not opened.damaged
-    reasons = [one.text for one in findings_of(flight, config, minutes=minutes, others=others)]
+    nearest = clearances(flight, config)
+    findings = findings_of(flight, config, minutes=minutes, others=others, nearest=nearest)
+    reasons = [one.text for one in findings]
     if not whole:
         reasons.append("the rehearsal's recording breaks off: submit the mission again")
     robots = [robot for robot in flight.robots.values() if robot.bands]
@@ -274,5 +335,7 @@ def judge(
         seconds=max(landings, default=None),
         distance=sum(robot.distance for robot in robots),
         battery_used=float(sum(known[0] - known[-1] for known in charges if len(known))),
+        seeds=[config.simulation.seed],
+        clearance=min(nearest, key=lambda one: one.distance, default=None),
         tracks={name: _track(robot) for name, robot in flight.robots.items() if robot.bands},
     )

@@ -20,6 +20,7 @@ from aerodaas.recording.report.plots.style import mark
 from aerodaas.recording.report.plots.trajectory import trajectory_figure
 from aerodaas.service.flights.environment import Outline
 from aerodaas.service.flights.orders import OtherLease
+from aerodaas.service.rehearsal.clearance import clearances
 from aerodaas.service.rehearsal.findings import Finding, findings_of
 
 __all__ = ["draw"]
@@ -49,11 +50,12 @@ def draw(
 
     Raises:
         RecordingError: If the recording cannot be read, or the picture cannot be written.
-        ConfigError: If a robot's fence is invalid.
+        ConfigError: If a robot's fence, the world or the terrain is invalid.
     """
     with Recording.open(recording) as opened:
         flight = RecordedFlight.read(opened)
-    findings = findings_of(flight, config, minutes=minutes, others=others)
+    nearest = clearances(flight, config)
+    findings = findings_of(flight, config, minutes=minutes, others=others, nearest=nearest)
     no_fly = [zone for robot in config.robots for zone in robot.limits.geofence.no_fly]
     overlay = partial(_overlay, findings=findings, others=others, no_fly=no_fly)
     png = png_of(flight, partial(trajectory_figure, overlay=overlay))
