@@ -49,7 +49,6 @@ __all__ = [
     "free_port",
     "inject",
     "told",
-    "wait_for",
 ]
 
 LOOPBACK = "127.0.0.1"
@@ -75,14 +74,6 @@ def free_port() -> int:
             probe.bind((LOOPBACK, port))
             return port
     raise AssertionError
-
-
-def wait_for(condition: Callable[[], bool], timeout: float = 20.0) -> None:
-    """Return when `condition` holds in real time; fail the test if it never does."""
-    deadline = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.02)
 
 
 class Stepped:

@@ -8,13 +8,14 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
 import pytest
 from flying import FLAT
+from waiting import until
 
 from aerodaas.actors.cluster.local_ray import LocalRay
 from aerodaas.actors.cluster.ray_process import LOCKS, VARIABLE
@@ -58,14 +59,6 @@ def started(folder: Path, command: str, *words: str) -> Iterator[subprocess.Pope
     ) as process:
         yield process
         process.kill()
-
-
-def until(happened: Callable[[], bool], seconds: float) -> None:
-    """Wait for something to happen."""
-    end = time.monotonic() + seconds
-    while not happened():
-        assert time.monotonic() < end, "it never happened"
-        time.sleep(0.1)
 
 
 def actors(pid: int) -> set[psutil.Process]:

@@ -4,26 +4,18 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
 
 import pytest
 from analyses import Above, Broken, Jitter, Ticker, Unwritten
 from flying import Flyer, hop, recorded
 from one_drone import drone_of, long, odometry_of, short, state_of
+from waiting import until
 
 from aerodaas import Environment, Odometry
 from aerodaas.errors import GraphError, MissionError
 from aerodaas.messages.mission import MissionState
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
-
-
-def until(condition: Callable[[], bool]) -> None:
-    """Wait until `condition` holds, for half a minute of wall time at most."""
-    deadline = time.monotonic() + 30.0
-    while not condition():
-        assert time.monotonic() < deadline, "it never happened"
-        time.sleep(0.005)
 
 
 def test_the_application_reads_streams_in_flight(flyer: Flyer) -> None:

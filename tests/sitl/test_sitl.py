@@ -33,12 +33,6 @@ pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420), pyte
 HERE = Path(__file__).parent
 
 
-@pytest.fixture(autouse=True)
-def journals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep what a flight changes on a vehicle in a folder of the test's own."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-
-
 def finish(flight: SitlFlight) -> None:
     """Fly to the mission's end: back home, on the ground."""
     flight.run(180.0)

@@ -7,8 +7,6 @@ are skipped.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from required import needs_peer
 
@@ -42,12 +40,6 @@ STOPS = AddNavigation(
         ]
     )
 )
-
-
-@pytest.fixture(autouse=True)
-def journals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep what a flight changes on a vehicle in a folder of the test's own."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
 
 
 def deliver(flight: SitlFlight) -> tuple[list[str], list[dict[str, str]]]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,12 +35,6 @@ OWN: dict[str, Any] = {
     "preflight": {"remote_id": "require"},
 }
 NEAR = {"action": "hold", "distance": 20.0, "height": 30.0, "lookahead": 4.0}
-
-
-@pytest.fixture(autouse=True)
-def journals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep what a flight changes on a vehicle in a folder of the test's own."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
 
 
 class Aboard:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -24,12 +22,6 @@ STOPS = [
     Waypoint("c", 20, 0, 8, speed=2.0),
     Waypoint("d", 5, 0, 6),
 ]
-
-
-@pytest.fixture(autouse=True)
-def journals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep what a flight changes on a vehicle in a folder of the test's own."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
 
 
 def handed_over(url: str) -> SitlFlight:

@@ -7,7 +7,6 @@ gimbal and a servo camera). Where the autopilot tells of none, the test is skipp
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import pytest
 
@@ -29,12 +28,6 @@ STOPS = AddNavigation(
         ]
     )
 )
-
-
-@pytest.fixture(autouse=True)
-def journals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep what a flight changes on a vehicle in a folder of the test's own."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
 
 
 def test_pictures_at_waypoints(autopilot: Autopilot) -> None:

@@ -7,7 +7,6 @@ tells of none, the tests are skipped.
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,12 +22,6 @@ from sitl.flights import SitlFlight
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420), pytest.mark.wall_clock]
 
 SPACING, LONG = 5.0, 40.0
-
-
-@pytest.fixture(autouse=True)
-def journals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep what a flight changes on a vehicle in a folder of the test's own."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
 
 
 @pytest.mark.parametrize("speed", [2.0, 5.0])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -26,12 +24,6 @@ PILOTS = {
 """Modes that a pilot chooses: what DO_SET_MODE takes after its first parameter."""
 LAND = PILOTS["land"]
 FLIGHTS = 5
-
-
-@pytest.fixture(autouse=True)
-def journals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep what a flight changes on a vehicle in a folder of the test's own."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
 
 
 def choose(flight: SitlFlight, family: str, modes: dict[str, tuple[float, ...]]) -> None:

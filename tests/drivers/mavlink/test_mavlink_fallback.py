@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from emulated import LOOPBACK, Flight, Stepped, free_port, wait_for
+from emulated import LOOPBACK, Flight, Stepped, free_port
 from typing_extensions import Self
+from waiting import until
 
 from aerodaas.drivers.mavlink.microservices import fallback
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
@@ -44,7 +45,7 @@ def test_a_killed_process_leaves_a_vehicle_that_comes_home(state_folder: Path) -
         for one in flights:
             one.kill_away_from_home()
         for one in flights:
-            wait_for(lambda: not one.autopilot.armed, 60.0)  # noqa: B023 - called at once
+            until(lambda: not one.autopilot.armed, 60.0)  # noqa: B023 - called at once
             assert away(one.autopilot) < 1.5
     assert list(state_folder.rglob("*.json")), "what is to be put back is not known any more"
 
@@ -70,7 +71,7 @@ class Killed:
 
     def kill_away_from_home(self) -> None:
         """`kill -9`, as soon as it is 4 m away."""
-        wait_for(lambda: away(self.autopilot) > 4.0, 60.0)
+        until(lambda: away(self.autopilot) > 4.0, 60.0)
         self._process.kill()
         self._process.wait()
 

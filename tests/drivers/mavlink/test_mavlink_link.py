@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 from autopilot import HERE, THERE, Wire
 from bench import Bench
-from emulated import LOOPBACK, Flight, wait_for
+from emulated import LOOPBACK, Flight
+from waiting import until
 
 from aerodaas.config.secrets import MAVLINK_KEY
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
@@ -469,7 +470,7 @@ def test_a_server_is_found_again_at_its_own_address(monkeypatch: pytest.MonkeyPa
                     return False
                 return True
 
-            wait_for(back, 5.0)
+            until(back, 5.0)
             with pytest.raises(BlockingIOError):
                 false.accept()
             wire.close()

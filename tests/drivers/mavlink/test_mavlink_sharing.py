@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 from autopilot import Wire
-from emulated import FAMILIES, LOOPBACK, Flight, Stepped, inject, wait_for
+from emulated import FAMILIES, LOOPBACK, Flight, Stepped, inject
+from waiting import until
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.senders import SenderPins
@@ -53,7 +54,7 @@ class Shared:
                 mine.extend(share.receive())
             return all(mine and mine[-1] == (packet(99), HERE) for mine in got)
 
-        wait_for(all_here)
+        until(all_here)
         return [mine[:-1] for mine in got]
 
     def close(self) -> None:
@@ -117,7 +118,7 @@ def test_a_flood_in_one_vehicles_name_costs_the_other_nothing() -> None:
         flood = [(packet(2), ELSEWHERE)] * 5000
         noise = [(b"noise", ELSEWHERE)] * 5000
         all_three.wires[0].inbox = [*flood, *noise, (packet(1), HERE), (packet(3), HERE)]
-        wait_for(lambda: (packet(3), HERE) in last.receive())
+        until(lambda: (packet(3), HERE) in last.receive())
         heard = [content for content, _ in _emptied(one)]
         assert heard.count(packet(1)) == 1
         assert packet(2) not in heard

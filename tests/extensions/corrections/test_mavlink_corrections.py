@@ -8,9 +8,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from emulated import Flight, wait_for
+from emulated import Flight
 from routed import routed
 from rtcm_station import BaseStation, rtcm
+from waiting import until
 
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.corrections import corrections as module
@@ -31,7 +32,7 @@ def test_what_the_station_says_is_passed_on() -> None:
         try:
             station.say(b"noise" + MESSAGE[:50])
             station.say(MESSAGE[50:] + b"$GPGGA,,*00\r\n" + MESSAGE)
-            wait_for(lambda: source.passed == 2)
+            until(lambda: source.passed == 2)
         finally:
             source.close()
     assert _content(got) == 2 * MESSAGE
@@ -47,10 +48,10 @@ def test_a_station_that_goes_and_comes_back_is_heard_again() -> None:
     try:
         with BaseStation(port) as station:
             station.say(MESSAGE)
-            wait_for(lambda: source.passed == 1)
+            until(lambda: source.passed == 1)
             station.hang_up()
             station.say(MESSAGE)
-            wait_for(lambda: source.passed == 2)
+            until(lambda: source.passed == 2)
     finally:
         source.close()
 
@@ -70,7 +71,7 @@ def test_silence_is_told_until_it_ends(monkeypatch: pytest.MonkeyPatch) -> None:
             offset = 60.0
             station.say(b"noise is no correction")
             station.say(MESSAGE)
-            wait_for(lambda: source.passed == 1)
+            until(lambda: source.passed == 1)
             assert source.reports(clock.monotonic() + 1.0) == []
         finally:
             source.close()
@@ -83,7 +84,7 @@ def test_what_is_too_much_or_too_large_is_left_out_and_told() -> None:
         source = Corrections(station.url, "d", got.append)
         try:
             station.say(rtcm(bytes(1000)) + 100 * MESSAGE)
-            wait_for(lambda: source.passed + source.left_out == 101)
+            until(lambda: source.passed + source.left_out == 101)
         finally:
             source.close()
         assert source.left_out > 50

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import pytest
 from autopilot import robot_of
-from emulated import LOOPBACK, free_port, wait_for
+from emulated import LOOPBACK, free_port
 from required import needs_peer, peer
 from router import Router
 from surveyors import payload_of
+from waiting import until
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
@@ -53,7 +54,7 @@ def test_its_pictures_its_lens_and_its_card() -> None:
         opened.callback(vehicle.close)
         vehicle.connect(20.0)
         payload = payload_of(vehicle)
-        wait_for(lambda: bool(payload.cameras()) and payload.photo_camera is not None)
+        until(lambda: bool(payload.cameras()) and payload.photo_camera is not None)
         used = payload.photo_camera
         assert isinstance(used, LensCamera)
         number = used.take_photo("gate")
@@ -63,10 +64,10 @@ def test_its_pictures_its_lens_and_its_card() -> None:
             said.extend(used.outcomes())
             return bool(said)
 
-        wait_for(look)
+        until(look)
         used.adjust(LensTarget(zoom=40.0, focus=60.0))
-        wait_for(lambda: used.adjusted)
-        wait_for(lambda: payload.cameras()[0].free is not None)
+        until(lambda: used.adjusted)
+        until(lambda: payload.cameras()[0].free is not None)
         (told,) = payload.cameras()
         did, _ = camera.communicate(timeout=10.0)
     (photo,) = said

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import itertools
 import os
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 
 from aerodaas.extensions.ros2.topics.link import RosLink
 
-__all__ = ["DOMAIN", "LOOPBACK", "loopback_domain", "ros_link", "topics", "wait_for"]
+__all__ = ["DOMAIN", "LOOPBACK", "loopback_domain", "ros_link", "topics"]
 
 LOOPBACK = """<CycloneDDS><Domain Id="any">
 <General><Interfaces><NetworkInterface name="lo"/></Interfaces>
@@ -24,14 +23,6 @@ DOMAIN = 10 + os.getpid() % 200
 """Tests that run beside these have another."""
 
 _numbers = itertools.count()
-
-
-def wait_for(condition: Callable[[], object], timeout: float = 20.0) -> None:
-    """Return when `condition` holds; fail the test if it never does."""
-    deadline = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.01)
 
 
 @pytest.fixture

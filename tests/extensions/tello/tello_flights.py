@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import socket
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
+
+from waiting import until
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.extensions.tello.camera import TelloCamera
@@ -15,7 +16,7 @@ from aerodaas.extensions.tello.vehicle import TelloVehicle
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from tools.tello_vehicle import EmulatedTello, TelloOptions
 
-__all__ = ["LOOPBACK", "Pair", "flight", "free_port", "robot_of", "wait_for"]
+__all__ = ["LOOPBACK", "Pair", "flight", "free_port", "robot_of"]
 
 LOOPBACK = "127.0.0.1"
 
@@ -26,14 +27,6 @@ def free_port(address: str = LOOPBACK) -> int:
         probe.bind((address, 0))
         port: int = probe.getsockname()[1]
         return port
-
-
-def wait_for(condition: Callable[[], bool], timeout: float = 15.0) -> None:
-    """Return when `condition` holds; fail the test if it never does."""
-    deadline = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.02)
 
 
 def robot_of(port: int, **settings: Any) -> RobotConfig:  # noqa: ANN401
@@ -68,7 +61,7 @@ class Pair:
 
     def until(self, mode: VehicleMode, timeout: float = 15.0) -> VehicleState:
         """Wait until the driver reports `mode`."""
-        wait_for(lambda: self.vehicle.read().mode is mode, timeout)
+        until(lambda: self.vehicle.read().mode is mode, timeout)
         return self.vehicle.read()
 
     def take_off(self, height: float = 1.0) -> VehicleState:

@@ -7,7 +7,8 @@ import time
 
 import numpy as np
 import pytest
-from tello_flights import Pair, flight, free_port, robot_of, wait_for
+from tello_flights import Pair, flight, free_port, robot_of
+from waiting import until
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.loading import load_vehicle
@@ -178,7 +179,7 @@ def test_two_tellos_on_one_host_with_the_default_ports() -> None:
             vehicles[-1].connect()
         charges = [vehicle.read().battery.fraction for vehicle in vehicles]
         vehicles[0].take_off(1.0)
-        wait_for(lambda: vehicles[0].read().mode is VehicleMode.HOLDING)
+        until(lambda: vehicles[0].read().mode is VehicleMode.HOLDING)
         assert one.mode is not VehicleMode.GROUNDED
         assert other.mode is VehicleMode.GROUNDED
         for vehicle in vehicles:
@@ -209,10 +210,10 @@ def test_a_tello_that_somebody_flies_is_left_in_the_air() -> None:
         pilot = load_vehicle(robot, config)
         pilot.connect()
         pilot.take_off(1.0)
-        wait_for(lambda: pilot.read().mode is VehicleMode.HOLDING)
+        until(lambda: pilot.read().mode is VehicleMode.HOLDING)
         vehicle = load_vehicle(robot_of(tello.port), config, observing=True)
         vehicle.connect()
-        wait_for(lambda: vehicle.read().armed)
+        until(lambda: vehicle.read().armed)
         with pytest.raises(VehicleError, match="only looked at"):
             vehicle.hold()
         with pytest.raises(VehicleError, match="only looked at"):
@@ -220,7 +221,7 @@ def test_a_tello_that_somebody_flies_is_left_in_the_air() -> None:
         vehicle.close()
         assert "land" not in {text for _, text in tello.heard}
         pilot.close()
-        wait_for(lambda: "land" in {text for _, text in tello.heard})  # a datagram, on its way
+        until(lambda: "land" in {text for _, text in tello.heard})  # a datagram, on its way
 
 
 @pytest.mark.slow

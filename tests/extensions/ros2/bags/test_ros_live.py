@@ -13,7 +13,8 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from numpy.typing import NDArray
-from ros_domain import DOMAIN, wait_for
+from ros_domain import DOMAIN
+from waiting import until
 
 from aerodaas.cameras.images import decode_depth, decode_image
 from aerodaas.extensions.ros2.bags.live import RosGraph
@@ -104,7 +105,7 @@ def test_a_state_is_odometry_transform_battery_and_fix(graph: RosGraph, ears: Ea
         graph.put(message("d-1/@state", state(sent), "d-1", sent))
         return all(ears.heard.values())
 
-    wait_for(complete)
+    until(complete)
     (odometry, *_), (battery, *_), (fix, *_), (moved, *_) = ears.heard.values()
     assert (odometry.header.frame_id, odometry.child_frame_id) == ("map", "d-1/base_link")
     assert 0 <= stamp_of(odometry) - EPOCH - STAMP < 1000
@@ -141,7 +142,7 @@ def test_a_frame_is_a_picture_with_its_lens_and_depth(graph: RosGraph, ears: Ear
         graph.put(message("d/vest", found, "d/eye"))
         return all(ears.heard.values())
 
-    wait_for(complete)
+    until(complete)
     (image, *_), (measured, *_), (lens, *_), (boxes, *_) = ears.heard.values()
     assert image.header == measured.header == lens.header == boxes.header
     assert stamp_of(image) == EPOCH + STAMP
@@ -173,7 +174,7 @@ def test_where_a_camera_is_mounted_is_kept(graph: RosGraph) -> None:
         heard.extend(reader.take())
         return bool(heard)
 
-    wait_for(told)
+    until(told)
     transforms = heard[-1].transforms
     assert [one.child_frame_id for one in transforms] == ["d/eye", "d/back"]
     transform = transforms[0].transform
@@ -192,5 +193,5 @@ def test_what_ros_has_no_message_for_is_left_out(graph: RosGraph, ros_link: RosL
     graph.put(message("d/words", "hello", "d/eye"))
     graph.put(message("d/nothing", None, "d/eye"))
     graph.put(message("seen/@state", state(5), "seen"))
-    wait_for(lambda: "/seen/odometry" in ros_link.published())
+    until(lambda: "/seen/odometry" in ros_link.published())
     assert not [name for name in ros_link.published() if name.startswith("/d/")]

@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from ros_domain import DOMAIN, wait_for
+from ros_domain import DOMAIN
+from waiting import until
 
 from aerodaas.cameras.base import Camera, Picture
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
@@ -91,7 +92,7 @@ def next_picture(camera: Ros2Camera) -> Picture:
         found.extend([] if picture is None else [picture])
         return bool(found)
 
-    wait_for(captured)
+    until(captured)
     return found[0]
 
 
@@ -144,7 +145,7 @@ def test_the_newest_picture_comes_once(ros_link: RosLink, topics: str) -> None:
             assert camera.capture(NOW, None) is None
             return camera.skipped == 1
 
-        wait_for(skipped)
+        until(skipped)
         publisher.publish(raw(image + 21, "bgr8", 21))
         np.testing.assert_array_equal(next_picture(camera).image, image + 21)
 

@@ -7,8 +7,8 @@ import time
 
 import numpy as np
 import pytest
-from ros_domain import wait_for
 from ros_drone import RosDrone
+from waiting import until
 
 from aerodaas.clock import ScaledClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
@@ -49,7 +49,7 @@ def test_a_mission_to_waypoints_and_home(ros_link: RosLink, topics: str) -> None
         try:
             clock = ScaledClock()
             vehicle.use_clock(clock)
-            wait_for(lambda: not vehicle.preflight())
+            until(lambda: not vehicle.preflight())
             mission = Mission(
                 robot, InlinePlanner(OrderedScheduler()), takeoff=vehicle.read().odometry.position
             )
@@ -70,7 +70,7 @@ def test_a_mission_to_waypoints_and_home(ros_link: RosLink, topics: str) -> None
                 assert distances.min() < 0.4, stop
             assert np.linalg.norm(drone.motion.position) < 0.5
             assert vehicle.read().ended is FlightEnd.LANDED
-            wait_for(lambda: drone.switched and not drone.switched[-1])
+            until(lambda: drone.switched and not drone.switched[-1])
             assert drone.switched[0], "the motors went on before they went off"
             assert vehicle.read().battery.fraction == pytest.approx(0.8)
         finally:

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ros_domain import wait_for
 from ros_drone import RosDrone
+from waiting import until
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.loading import load_vehicle
@@ -72,9 +72,9 @@ def hovering(
 ) -> Iterator[tuple[RosDrone, Ros2Vehicle]]:
     """A drone a metre up."""
     with RosDrone(ros_link, topics) as drone, connected(topics, **settings) as vehicle:
-        wait_for(lambda: not vehicle.preflight())
+        until(lambda: not vehicle.preflight())
         vehicle.take_off(1.0)
-        wait_for(lambda: vehicle.read().mode is VehicleMode.HOLDING)
+        until(lambda: vehicle.read().mode is VehicleMode.HOLDING)
         yield drone, vehicle
 
 
@@ -98,15 +98,15 @@ def test_it_rises_obeys_holds_and_lands(ros_link: RosLink, topics: str) -> None:
 
         assert vehicle.read().mode is VehicleMode.GUIDED
         # Nobody sends any more: it stops by itself, and stays.
-        wait_for(lambda: vehicle.read().mode is VehicleMode.HOLDING)
+        until(lambda: vehicle.read().mode is VehicleMode.HOLDING)
         vehicle.land()
         assert vehicle.read().mode is VehicleMode.LANDING
         with pytest.raises(VehicleError, match="follow a setpoint while it is landing"):
             vehicle.send(sent)
-        wait_for(lambda: vehicle.read().mode is VehicleMode.GROUNDED)
+        until(lambda: vehicle.read().mode is VehicleMode.GROUNDED)
         state = vehicle.read()
         assert (state.ended, state.armed) == (FlightEnd.LANDED, False)
-        wait_for(lambda: not drone.enabled)
+        until(lambda: not drone.enabled)
         assert drone.motion.position[2] == 0.0
 
 
@@ -120,7 +120,7 @@ def test_without_odometry_it_stands_still_and_is_lost(ros_link: RosLink, topics:
             time.sleep(0.05)
             return speed(drone.velocity) > 0.5
 
-        wait_for(pushed)
+        until(pushed)
         drone.silent = True
 
         def lost() -> bool:
@@ -128,20 +128,20 @@ def test_without_odometry_it_stands_still_and_is_lost(ros_link: RosLink, topics:
             time.sleep(0.05)
             return vehicle.read().mode is VehicleMode.LOST
 
-        wait_for(lost)
+        until(lost)
         assert speed(drone.velocity) == 0.0
         assert any("no odometry on" in one for one in vehicle.read().faults)
         vehicle.land()
-        wait_for(lambda: drone.velocity.z == pytest.approx(-1.0))
+        until(lambda: drone.velocity.z == pytest.approx(-1.0))
         drone.silent = False
-        wait_for(lambda: vehicle.read().mode is VehicleMode.GROUNDED)
+        until(lambda: vehicle.read().mode is VehicleMode.GROUNDED)
 
 
 def test_odometry_of_nan_is_none(ros_link: RosLink, topics: str) -> None:
     """It is refused, told, and the drone lost as without any; nor are setpoints of it."""
     with RosDrone(ros_link, topics) as drone, connected(topics) as vehicle:
         drone.spoiled = True
-        wait_for(lambda: vehicle.read().mode is VehicleMode.LOST)
+        until(lambda: vehicle.read().mode is VehicleMode.LOST)
         state = vehicle.read()
         assert any("odometry refused" in one for one in state.faults)
         assert state.extra["refused_messages"] > 0
@@ -160,9 +160,9 @@ def test_letting_go_in_the_air_stops_it(ros_link: RosLink, topics: str) -> None:
     """Its last word is zero."""
     with hovering(ros_link, topics) as (drone, vehicle):
         vehicle.send(VelocitySetpoint(np.array([2.0, 0.0, 0.0])))
-        wait_for(lambda: speed(drone.velocity) > 0.5)
+        until(lambda: speed(drone.velocity) > 0.5)
         vehicle.close()
-        wait_for(lambda: speed(drone.velocity) == 0.0)
+        until(lambda: speed(drone.velocity) == 0.0)
         heard = len(drone.heard)
         time.sleep(0.2)
         assert len(drone.heard) == heard
@@ -180,8 +180,8 @@ def test_what_speaks_against_a_take_off_is_told(ros_link: RosLink, topics: str) 
         connected(topics, battery=f"{topics}/battery", velocity="/nobody") as vehicle,
     ):
         drone.charge = 0.1
-        wait_for(lambda: "nobody subscribes to /nobody" in vehicle.preflight())
-        wait_for(lambda: "the battery holds 10%, take-off needs 20%" in vehicle.preflight())
+        until(lambda: "nobody subscribes to /nobody" in vehicle.preflight())
+        until(lambda: "the battery holds 10%, take-off needs 20%" in vehicle.preflight())
         with pytest.raises(VehicleError, match="refuses to take off: nobody subscribes"):
             vehicle.take_off(1.0)
         for height in (math.nan, 0.0, -1.0):
@@ -217,9 +217,9 @@ def test_odometry_that_begins_anywhere_is_aligned(ros_link: RosLink, topics: str
         state = vehicle.read()
         np.testing.assert_allclose(state.odometry.position, [5, 6, 7], atol=0.01)
         assert state.odometry.yaw == pytest.approx(0.0, abs=0.01)
-        wait_for(lambda: not vehicle.preflight())
+        until(lambda: not vehicle.preflight())
         vehicle.take_off(2.0)
-        wait_for(lambda: len(drone.heard) > 0)
+        until(lambda: len(drone.heard) > 0)
         vehicle.close()
 
 
@@ -232,9 +232,9 @@ def test_a_twist_can_be_stamped(ros_link: RosLink, topics: str) -> None:
         RosDrone(ros_link, topics),
         connected(topics, velocity_frame="world", **settings) as vehicle,
     ):
-        wait_for(lambda: not vehicle.preflight())
+        until(lambda: not vehicle.preflight())
         vehicle.take_off(1.0)
-        wait_for(lambda: heard)
+        until(lambda: heard)
     assert heard[0].header.frame_id == "x3/odom"
     assert abs(heard[0].header.stamp.sec - time.time()) < 60
     assert heard[0].twist.linear.z > 0

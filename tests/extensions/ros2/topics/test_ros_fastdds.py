@@ -13,8 +13,9 @@ import cv2
 import numpy as np
 import pytest
 from required import needs_peer, peer
-from ros_domain import DOMAIN, wait_for
+from ros_domain import DOMAIN
 from ros_drone import odometry_message
+from waiting import until
 
 from aerodaas.cameras.base import Picture
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
@@ -100,7 +101,7 @@ def test_it_is_flown_and_its_pictures_are_read(drone: FastDrone, topics: str) ->
     camera = Ros2Camera(robot.sensors[0], environment)
     camera.open()
     try:
-        wait_for(lambda: camera.model)
+        until(lambda: camera.model)
         pictures: list[Picture] = []
 
         def captured() -> bool:
@@ -108,7 +109,7 @@ def test_it_is_flown_and_its_pictures_are_read(drone: FastDrone, topics: str) ->
             pictures.extend([] if picture is None else [picture])
             return bool(pictures)
 
-        wait_for(captured)
+        until(captured)
         rgb = (np.arange(640 * 480 * 3) % 251).astype(np.uint8).reshape(480, 640, 3)
         np.testing.assert_array_equal(pictures[0].image, rgb[..., ::-1])
     finally:
@@ -116,9 +117,9 @@ def test_it_is_flown_and_its_pictures_are_read(drone: FastDrone, topics: str) ->
     vehicle = Ros2Vehicle(robot, environment)
     vehicle.connect()
     try:
-        wait_for(lambda: not vehicle.preflight())
+        until(lambda: not vehicle.preflight())
         vehicle.take_off(1.0)
-        wait_for(lambda: vehicle.read().mode is VehicleMode.HOLDING)
+        until(lambda: vehicle.read().mode is VehicleMode.HOLDING)
         goal = PositionSetpoint(np.array([1.5, -0.8, 1.2]), 2.0)
 
         def there() -> bool:
@@ -128,11 +129,11 @@ def test_it_is_flown_and_its_pictures_are_read(drone: FastDrone, topics: str) ->
             away = float(np.linalg.norm(now.position - goal.position))
             return away < 0.1 and abs(now.yaw - 2.0) < 0.1
 
-        wait_for(there)
+        until(there)
         vehicle.land()
-        wait_for(lambda: vehicle.read().mode is VehicleMode.GROUNDED)
+        until(lambda: vehicle.read().mode is VehicleMode.GROUNDED)
         assert vehicle.read().ended is FlightEnd.LANDED
-        wait_for(lambda: drone.said("enable")[-1] == ["0"])
+        until(lambda: drone.said("enable")[-1] == ["0"])
         assert drone.said("enable")[0] == ["1"]
     finally:
         vehicle.close()
@@ -163,7 +164,7 @@ def test_it_hears_what_we_publish(ros_link: RosLink, drone: FastDrone, topics: s
     }
     for name, message in messages.items():
         publisher = ros_link.publisher(f"{topics}/heard/{name}", message.__msgtype__)
-        wait_for(partial(getattr, publisher, "listeners"))
+        until(partial(getattr, publisher, "listeners"))
         publisher.publish(message)
-    wait_for(lambda: all(drone.said(kind) for kind in told))
+    until(lambda: all(drone.said(kind) for kind in told))
     assert {kind: " ".join(drone.said(kind)[0]) for kind in told} == told

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ros_domain import DOMAIN, wait_for
+from ros_domain import DOMAIN
+from waiting import until
 
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.extensions.ros2.topics import types
@@ -21,14 +22,14 @@ def test_messages_reach_subscribers(ros_link: RosLink, topics: str) -> None:
     try:
         other.subscribe(f"{topics}/enable", types.BOOL, heard.append)
         publisher = ros_link.publisher(f"{topics}/enable", types.BOOL)
-        wait_for(lambda: publisher.listeners == 1)
+        until(lambda: publisher.listeners == 1)
         publisher.publish(types.ros_message(types.BOOL, data=True))
-        wait_for(lambda: heard)
+        until(lambda: heard)
         assert heard[-1] == types.ros_message(types.BOOL, data=True)
-        wait_for(lambda: other.published().get(f"{topics}/enable") == "std_msgs/msg/Bool")
+        until(lambda: other.published().get(f"{topics}/enable") == "std_msgs/msg/Bool")
     finally:
         other.close()
-    wait_for(lambda: publisher.listeners == 0)
+    until(lambda: publisher.listeners == 0)
 
 
 @pytest.mark.usefixtures("loopback_domain")
@@ -50,7 +51,7 @@ def test_a_message_that_cannot_be_decoded_is_counted(
     heard: list[Any] = []
     ros_link.subscribe(f"{topics}/image", types.COMPRESSED_IMAGE, heard.append)
     publisher = ros_link.publisher(f"{topics}/image", types.COMPRESSED_IMAGE)
-    wait_for(lambda: publisher.listeners == 1)
+    until(lambda: publisher.listeners == 1)
     store = types.ros_types()
     decode = store.deserialize_cdr
 
@@ -61,10 +62,10 @@ def test_a_message_that_cannot_be_decoded_is_counted(
 
     monkeypatch.setattr(store, "deserialize_cdr", spoiled)
     publisher.publish(types.ros_message(types.COMPRESSED_IMAGE, format="spoiled"))
-    wait_for(lambda: ros_link.garbled == 1)
+    until(lambda: ros_link.garbled == 1)
     whole = np.arange(5, dtype=np.uint8)
     publisher.publish(types.ros_message(types.COMPRESSED_IMAGE, data=whole))
-    wait_for(lambda: heard)
+    until(lambda: heard)
     assert [one.data.tolist() for one in heard] == [[0, 1, 2, 3, 4]]
 
 
