@@ -6,6 +6,7 @@ import ast
 import difflib
 import importlib.util
 import keyword
+import os
 import shutil
 from pathlib import Path
 from typing import Annotated
@@ -126,7 +127,9 @@ _SCHEMA = "environment.schema.json"
 
 
 def new(
-    name: Annotated[str, typer.Argument(help="Of the application, its file and its folder.")],
+    name: Annotated[
+        str | None, typer.Argument(help="Of the application, its file and its folder.")
+    ] = None,
     template: Annotated[
         str,
         typer.Option(
@@ -136,16 +139,48 @@ def new(
             "`detector`, `scheduler`, `camera`, `driver` or `extension`.",
         ),
     ] = "survey",
+    from_document: Annotated[
+        Path | None,
+        typer.Option(
+            "--from-document",
+            metavar="FILE",
+            help="Write this mission document as a Python application instead.",
+        ),
+    ] = None,
+    env: Annotated[
+        Path | None,
+        typer.Option(
+            help="With --from-document: the environment file that the application names. Default: "
+            "the one that the document names."
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="With --from-document: the file. Default: FILE with .py."
+        ),
+    ] = None,
 ) -> None:
     """Begin an application: a folder with its file, an environment, a test, a README.
 
     It flies at once, in simulation.
 
+    With `--from-document` it is one file of at most 40 lines, which flies the same mission as the
+    document: to read what a program has planned, and to go on in Python.
+
         aerodaas new my_app
         cd my_app
         aerodaas run my_app.py
         pip install pytest && pytest
+        aerodaas new --from-document mission.json -o my_mission.py
     """
+    if from_document is not None:
+        if name is not None:
+            raise ConfigError(f"--from-document writes one file: name it by -o {name}.py")
+        _write_application(from_document, env, output or from_document.with_suffix(".py"))
+        return
+    if name is None:
+        raise ConfigError("name the application, as in `aerodaas new my_app`")
     templates = sorted(path.parent.name for path in TEMPLATES.glob(f"*/{_NAME}.py"))
     if template not in templates:
         raise UnknownIdError("template", template, templates)
@@ -162,6 +197,28 @@ def new(
         raise ConfigError(f"cannot write {folder}: {error.strerror}") from None
     typer.echo(f"{name}/: {', '.join(files)}")
     typer.echo(f"fly it: cd {name} && aerodaas run {name}.py")
+
+
+def _write_application(source: Path, environment: Path | None, output: Path) -> None:
+    """Write a mission document as an application; raises ConfigError if its file is there."""
+    from aerodaas.dataflow.mission_document import read_mission  # noqa: PLC0415 - slow to load
+    from aerodaas.documents.application import application_text  # noqa: PLC0415 - as above
+    from aerodaas.environment.document.flying import environment_beside  # noqa: PLC0415 - as above
+
+    document = read_mission(source)
+    environment = environment or environment_beside(document, source)
+    # An application looks its environment up beside its own file.
+    named = environment and os.path.relpath(environment, output.parent)
+    text = application_text(document, named and Path(named).as_posix())
+    try:
+        with output.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise ConfigError(f"{output} is there already: name another file by --output") from None
+    except OSError as error:
+        raise ConfigError(f"cannot write {output}: {error.strerror}") from None
+    lines = text.count("\n")
+    typer.echo(f"{output}: {lines} lines; fly it: aerodaas run {output}")
 
 
 def _check(name: str) -> None:

@@ -74,3 +74,41 @@ def test_a_bad_document_has_its_findings(
     assert code == 1
     assert not report["passed"]
     assert report["findings"][0]["check"] == check
+
+
+def test_a_document_becomes_an_application_that_compiles_to_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """In another folder, with the environment that lies beside the document."""
+    Path("written").mkdir()
+    code, out, _ = ran(capsys, "new", "--from-document", "mission.json", "-o", "written/patrol.py")
+    assert code == 0
+    assert "aerodaas run written/patrol.py" in out
+    code, out, _ = ran(capsys, "compile", "written/patrol.py")
+    assert json.loads(out) == {**DOCUMENT, "name": "patrol"}
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["new"],
+        ["new", "patrol", "--from-document", "mission.json"],
+        ["new", "--from-document", "none.json"],
+        ["new", "--from-document", "mission.json", "-o", "environment.json"],
+    ],
+)
+def test_what_cannot_be_written_is_refused(
+    capsys: pytest.CaptureFixture[str], words: list[str]
+) -> None:
+    """Without a name, with two of them, without a document, and over a file that is there."""
+    code, _, said = ran(capsys, *words)
+    assert code == 2
+    assert said
+    assert json.loads(Path("environment.json").read_text()) == FLAT
+
+
+def test_the_schema_of_documents_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    """As JSON, with the analyses that are installed."""
+    code, out, _ = ran(capsys, "schema", "--document")
+    assert code == 0
+    assert "distance" in json.loads(out)["$defs"]["PersonFollowAnalytics"]["properties"]

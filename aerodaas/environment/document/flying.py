@@ -18,6 +18,7 @@ from aerodaas.recording.reader import Recording
 __all__ = [
     "built_document",
     "compile_application",
+    "environment_beside",
     "environment_of",
     "fly_mission",
     "recorded_document",
@@ -118,13 +119,29 @@ def environment_of(document: MissionDocument, path: Path, options: RunOptions) -
     return Environment(options.environment or ("" if provided else _file_of(document, path)))
 
 
-def _file_of(document: MissionDocument, path: Path) -> Path:
+def environment_beside(document: MissionDocument, path: Path) -> Path | None:
+    """The environment file that a document names, beside it or in `environments/` there.
+
+    Args:
+        document: The content of the file.
+        path: The file.
+
+    Returns:
+        The file's path; None if there is none.
+    """
     name = document.environment
     if name and Path(name).name == name:
         for folder in (path.parent, path.parent / _ENVIRONMENTS):
             if (folder / name).is_file():
                 return (folder / name).resolve()
-    raise ConfigError(
-        f"{path} was written for {name or 'an environment without a name'}, which is not beside "
-        "it: give the file of yours by --env"
-    )
+    return None
+
+
+def _file_of(document: MissionDocument, path: Path) -> Path:
+    found = environment_beside(document, path)
+    if found is None:
+        raise ConfigError(
+            f"{path} was written for {document.environment or 'an environment without a name'}, "
+            "which is not beside it: give the file of yours by --env"
+        )
+    return found
