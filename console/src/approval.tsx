@@ -3,7 +3,7 @@
 import "./approval.css";
 import type { ComponentChildren } from "preact";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { answered, ask, messageOf } from "./connection";
+import { answered, ask, messageOf, usePolled } from "./connection";
 import { type Flight, useFlight } from "./flight";
 import { FlightMap } from "./map";
 import { Page, Silence } from "./page";
@@ -19,6 +19,8 @@ import { Badge, Button, Card, Field, Figure, type FigureProps, useEscape } from 
 import { clock, wordsOf } from "./words";
 import type { AccountOut, ApprovalIn, Envelope, FleetOut, MissionOut, ProposalOut, RobotConfig } from "./wire";
 
+/** Milliseconds between two requests of the proposal. */
+const PAUSE = 1000;
 /** Metres around the ways in the area that is suggested for changes. */
 const MARGIN = 5;
 /** Share of the charge above the reserve below which what is left is shown as little. */
@@ -32,17 +34,26 @@ interface ApprovalProps {
   areas: LeasedArea[];
   title: ComponentChildren;
   onMission(id: string): void;
+  /** What is shown of a mission that was not proposed. */
+  children: ComponentChildren;
 }
 
 /** The page of a mission that was proposed and has not flown yet. */
 export function ApprovalPage(props: ApprovalProps) {
   const { first, account, title } = props;
+  const path = `v1/missions/${first.id}`;
+  const { answer } = usePolled(
+    path,
+    (signal) => ask<MissionOut>(path, undefined, signal),
+    (newest) => (newest && !newest.proposal ? null : PAUSE),
+  );
   const flight = useFlight(first.id, [first], () => new LiveSource(first.id));
   /** Hash of what was first shown to be decided about. */
   const opened = useRef<string | null>(null);
-  const proposal = flight?.mission.proposal;
-  if (!flight || !proposal) return null;
-  const waits = flight.mission.phase === "awaiting_approval";
+  if (!flight || !answer) return null;
+  const { proposal, phase } = answer;
+  if (!proposal) return <>{props.children}</>;
+  const waits = phase === "awaiting_approval";
   if (waits) opened.current ??= proposal.hash;
   return (
     <Page title={title} who={`${account.name}, ${account.role}`} flight={flight}>
@@ -53,15 +64,14 @@ export function ApprovalPage(props: ApprovalProps) {
         </p>
       )}
       {/* What was ticked for one is not for another. */}
-      <Review key={proposal.hash} {...props} {...{ flight, proposal }} />
+      <Review key={proposal.hash} {...props} {...{ flight, proposal }} mission={answer} />
     </Page>
   );
 }
 
-type ReviewProps = ApprovalProps & { flight: Flight; proposal: ProposalOut };
+type ReviewProps = Omit<ApprovalProps, "children"> & { flight: Flight; mission: MissionOut; proposal: ProposalOut };
 
-function Review({ flight, proposal, account, fleet, areas, onMission }: ReviewProps) {
-  const { mission } = flight;
+function Review({ flight, mission, proposal, account, fleet, areas, onMission }: ReviewProps) {
   const { verdict } = mission;
   const scenery = useScenery(`v1/missions/${mission.id}/scenery`);
   const [envelope, setEnvelope] = useState<Envelope | null>(null);

@@ -112,8 +112,12 @@ function App() {
           <strong class="name">{mission.name}</strong>
         ),
     };
-    if (mission.proposal && mission.started === null) {
-      return <ApprovalPage key={mission.id} {...page} onMission={choose} />;
+    if (provided && mission.started === null) {
+      return (
+        <ApprovalPage key={mission.id} {...page} onMission={choose}>
+          <FlightPage {...page} />
+        </ApprovalPage>
+      );
     }
     const replayed = mission.recording && account.scopes.includes("sense");
     if (!replayed || seen === mission.id) return <FlightPage key={mission.id} {...page} />;

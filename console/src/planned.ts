@@ -124,11 +124,11 @@ export function heightsOf(ways: PlannedWay[]): [lowest: number, highest: number]
   return [Math.min(...ups, Infinity), Math.max(...ups, 0)];
 }
 
-/** Corners of a rectangle around some places. */
+/** Corners, at whole metres, of a rectangle around some places. */
 export function boxAround(places: Point[], margin: number): [Point, Point, Point, Point] {
   const [easts, norths] = [places.map(([east]) => east), places.map(([, north]) => north)];
-  const [west, east] = [Math.min(...easts) - margin, Math.max(...easts) + margin];
-  const [south, north] = [Math.min(...norths) - margin, Math.max(...norths) + margin];
+  const [west, east] = [Math.floor(Math.min(...easts) - margin), Math.ceil(Math.max(...easts) + margin)];
+  const [south, north] = [Math.floor(Math.min(...norths) - margin), Math.ceil(Math.max(...norths) + margin)];
   return [[west, south], [east, south], [east, north], [west, north]];
 }
 
