@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from missions.catalogue import APPS, MISSIONS
 from missions.criteria import Criterion
@@ -46,6 +46,8 @@ from agent_tasks.documents import Stop, document, legs, ring, stop, turned
 __all__ = ["TASKS", "Task"]
 
 Make: TypeAlias = Callable[[], MissionDocument]
+Content: TypeAlias = dict[str, Any]
+"""JSON of a part of a document."""
 
 _EAST, _NORTH, _WEST, _SOUTH = 0.0, 90.0, 180.0, -90.0
 _BASE = "quadrotor_base"
@@ -442,7 +444,7 @@ def _missions() -> list[Task]:
             "tower",
             "Find the radio tower and inspect it up to 35 m.",
             "tower_inspection",
-            {"top": 20},
+            _up_to_20_metres,
             "up to 20 m",
             ("climbed",),
         ),
@@ -451,11 +453,19 @@ def _missions() -> list[Task]:
             "rescue",
             "Find who is lost, and stay with them to the road.",
             "search_and_rescue",
-            {"distance": 4},
-            "4 m from them",
-            ("2 ± 0.5 m",),
+            _half_way,
+            "lands half way to the road",
+            ("followed",),
         ),
     ]
+
+
+def _up_to_20_metres(analyses: list[Content]) -> None:
+    analyses[0]["settings"]["top"] = 20
+
+
+def _half_way(analyses: list[Content]) -> None:
+    analyses[-1]["triggers"][0]["when"]["of"]["place"] = [30, 16]
 
 
 def _along(corners: Sequence[tuple[float, float]], height: float) -> list[Place]:
@@ -475,20 +485,18 @@ def _application(
     environment: str,
     request: str,
     application: str,
-    settings: Mapping[str, object],
+    spoil: Callable[[list[Content]], None],
     mistake: str,
     fails: tuple[str, ...],
 ) -> Task:
-    """A task of an application's own document; its near miss has other settings of an analysis."""
+    """A task of an application's own document, whose analyses `spoil` changes for the near miss."""
 
     def solution() -> MissionDocument:
         return compile_application(APPS / f"{application}.py", [])
 
     def miss() -> MissionDocument:
         content = solution().model_dump(mode="json")
-        for analysis in content["analyses"]:
-            if settings.keys() & analysis["settings"].keys():
-                analysis["settings"] |= settings
+        spoil(content["analyses"])
         return MissionDocument.model_validate(content)
 
     truth = MISSIONS[application].criteria

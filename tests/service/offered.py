@@ -126,6 +126,7 @@ class Provider:
         *,
         drone: dict[str, Any] | None = None,
         compute: list[dict[str, Any]] | None = None,
+        simulation: dict[str, Any] | None = None,
         watched: bool = True,
         **settings: Any,  # noqa: ANN401
     ) -> None:
@@ -133,7 +134,9 @@ class Provider:
         robots = [one | (drone or {}) for one in (robot("one"), robot("two", 10))]
         for one in robots:
             one["sensors"] += [{"id": name, "type": "camera"} for name in ("cam", "belly")]
-        content = fleet(*robots) | ({} if compute is None else {"compute": compute})
+        content: dict[str, Any] = fleet(*robots)
+        content |= {} if compute is None else {"compute": compute}
+        content["simulation"] = {**content["simulation"], **(simulation or {})}
         path.write_text(json.dumps(content), encoding="utf-8")
         self.started: list[Any] = []
         monkeypatch.setattr(missions, "start_process", self._start)
