@@ -97,7 +97,7 @@ class FleetRobot(_Answer):
             ready=robot.enabled and not robot.objection and robot.mission is None,
             objection=world(robot.objection),
             leased=robot.lease is not None,
-            place=robot.position,
+            place=_rounded(robot.position),
             battery=robot.battery,
             age_s=_age(robot.heard),
         )
@@ -245,11 +245,11 @@ class RobotState(_Answer):
             robot=robot,
             state=mission.state.value,
             age_s=_age(told),
-            place=place,
+            place=_rounded(place),
             heading_compass_deg=None if odometry is None else _heading(odometry.yaw),
             speed=None if odometry is None else round(length(odometry.velocity), 2),
-            battery=status.charge,
-            distance=mission.distance,
+            battery=None if status.charge is None else round(status.charge, 3),
+            distance=round(mission.distance, 1),
             waypoints_visited=visited,
             waypoints_known=known,
             visited=untrusted(mission.visited),
@@ -271,7 +271,7 @@ class MissionAnswer(_Answer):
     reason: Untrusted | None
     link: str | None
     """Page on which a person approves it; None while no approval is awaited."""
-    approval_lapses_s: float | None
+    approval_lapses_s: int | None
     """Seconds for which its approval is still good for a take-off."""
     robots: list[RobotState]
     alerts: list[Untrusted]
@@ -280,7 +280,8 @@ class MissionAnswer(_Answer):
     def of(cls, mission: MissionOut, link: str) -> MissionAnswer:
         """Convert a mission; `link` is the page on which it is approved."""
         asks = mission.phase is MissionPhase.AWAITING_APPROVAL
-        approval = None if mission.proposal is None else mission.proposal.approval
+        proposal = mission.proposal if mission.phase is MissionPhase.QUEUED else None
+        approval = None if proposal is None else proposal.approval
         return cls(
             mission=mission.id,
             phase=mission.phase,
@@ -288,7 +289,7 @@ class MissionAnswer(_Answer):
             over=mission.phase.over,
             reason=world(mission.reason),
             link=link if asks else None,
-            approval_lapses_s=None if approval is None else max(0.0, approval.lapses - time.time()),
+            approval_lapses_s=None if approval is None else round(approval.lapses - time.time()),
             robots=RobotState.all_of(mission),
             alerts=untrusted(mission.alerts),
         )
@@ -361,6 +362,11 @@ class ResultsAnswer(_Answer):
             robots=RobotState.all_of(mission),
             alerts=untrusted(mission.alerts),
         )
+
+
+def _rounded(place: Place | None) -> Place | None:
+    """A place to the centimetre."""
+    return None if place is None else (round(place[0], 2), round(place[1], 2), round(place[2], 2))
 
 
 def _age(moment: float | None) -> float | None:

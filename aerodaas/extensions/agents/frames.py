@@ -8,13 +8,14 @@ place of take-off unless it says otherwise. A tool's waypoint has `heading_compa
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import fields
 from typing import Any
 
 from aerodaas.config.checked import near
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.agents.text import plain
+from aerodaas.messages.actions import LARGEST, action_kinds
 from aerodaas.messages.waypoints import Waypoint, WaypointType
 
 __all__ = [
@@ -70,14 +71,15 @@ def document_waypoints(waypoints: object, place: str) -> list[dict[str, Any]]:
 def _document_waypoint(waypoint: Mapping[str, Any], place: str) -> dict[str, Any]:
     yaw = waypoint.get("yaw")
     if yaw is not None:
-        known = isinstance(yaw, int | float) and math.isfinite(yaw)
-        meant = f": a yaw of {yaw:g} is {heading_of_yaw(yaw):.1f}" if known else ""
+        radians = _number(yaw)
+        meant = "" if radians is None else f": yours is {heading_of_yaw(radians):.1f}"
         raise ConfigError(f"{place}.yaw: give {HEADING}, clockwise from north{meant}")
-    for name in waypoint.keys() - _KNOWN:
-        if name != "yaw":
-            raise ConfigError(
-                f"{place}.{plain(str(name), 64)}: there is no such field{near(str(name), _KNOWN)}"
-            )
+    _require_known({name: one for name, one in waypoint.items() if name != "yaw"}, _KNOWN, place)
+    for number, action in enumerate(_actions(waypoint)):
+        kind: Any = action_kinds().get(str(action.get("type")))
+        if kind is not None:
+            known = {field.name for field in fields(kind)}
+            _require_known(action, known, f"{place}.actions.{number}")
     kind = waypoint.get("waypoint_type", WaypointType.LOCAL.value)
     if kind not in WAYPOINT_TYPES:
         raise ConfigError(
@@ -86,14 +88,30 @@ def _document_waypoint(waypoint: Mapping[str, Any], place: str) -> dict[str, Any
         )
     content = {name: value for name, value in waypoint.items() if name in _FIELDS}
     content["waypoint_type"] = kind
-    heading = waypoint.get(HEADING)
-    if heading is not None:
-        if isinstance(heading, bool) or not isinstance(heading, int | float):
-            raise ConfigError(f"{place}.{HEADING}: a number of degrees, 0 to 360")
-        if not 0.0 <= heading <= _FULL_TURN:
-            raise ConfigError(f"{place}.{HEADING}: 0 to 360 degrees, not {heading:g}")
+    if waypoint.get(HEADING) is not None:
+        heading = _number(waypoint[HEADING])
+        if heading is None or not 0.0 <= heading <= _FULL_TURN:
+            given = "" if heading is None else f", not {heading:g}"
+            raise ConfigError(f"{place}.{HEADING}: a number of degrees from 0 to 360{given}")
         content["yaw"] = yaw_of_heading(heading)
     return content
+
+
+def _number(value: object) -> float | None:
+    """A number of a usual size; None for anything else."""
+    usual = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST
+    return float(value) if usual else None  # type: ignore[arg-type]
+
+
+def _actions(waypoint: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    actions = waypoint.get("actions")
+    return [one for one in actions if isinstance(one, dict)] if isinstance(actions, list) else []
+
+
+def _require_known(content: Mapping[str, Any], known: Collection[str], place: str) -> None:
+    for field in content.keys() - known:
+        name = plain(field, 64)
+        raise ConfigError(f"{place}.{name}: there is no such field{near(name, known)}")
 
 
 def tool_waypoints(waypoints: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:

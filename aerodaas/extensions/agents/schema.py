@@ -48,7 +48,7 @@ def bounded(schema: Mapping[str, Any], fleet: EnvironmentConfig) -> dict[str, An
         schema: Schema with pydantic's definitions of a mission document, or of parts of one.
         fleet: The fleet's catalogue.
     """
-    found: dict[str, Any] = untitled(schema)
+    found: dict[str, Any] = {**untitled(schema), "additionalProperties": False}
     definitions: dict[str, Any] = found.get("$defs", {})
     if "Waypoint" in definitions:
         _bound_waypoint(definitions["Waypoint"], fleet)

@@ -6,6 +6,7 @@ import json
 import logging
 import tempfile
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,7 @@ _READS = ToolAnnotations(read_only_hint=True, open_world_hint=False)
 _ADDS = ToolAnnotations(
     read_only_hint=False, destructive_hint=False, idempotent_hint=True, open_world_hint=False
 )
+_ENDS = _ADDS.model_copy(update={"destructive_hint": True})
 _LONGEST = 1000
 """Characters of a refusal."""
 _MOST_PROBLEMS = 5
@@ -51,15 +53,12 @@ _MOST_PROBLEMS = 5
 class AgentServer(MCPServer[Any]):
     """Server of the tools; whoever calls has the rights of the token that the call carries."""
 
-    def __init__(
-        self, caller: Callable[[Call], Caller], fleet: EnvironmentConfig, version: str = ""
-    ) -> None:
+    def __init__(self, caller: Callable[[Call], Caller], fleet: EnvironmentConfig) -> None:
         """Offer the tools.
 
         Args:
             caller: Finds the account that calls.
             fleet: Catalogue of the fleet, whose bounds stand in the schemas.
-            version: Version of this software.
         """
         # The SDK would have the whole process log in colours and boxes.
         logging.basicConfig(level=logging.WARNING)
@@ -67,7 +66,7 @@ class AgentServer(MCPServer[Any]):
             "aerodaas",
             title="AeroDaaS",
             instructions=_INSTRUCTIONS,
-            version=version,
+            version=version("aerodaas"),
             log_level="WARNING",
         )
         self._fleet = fleet
@@ -82,8 +81,8 @@ class AgentServer(MCPServer[Any]):
             (tools.request_approval, _ADDS.model_copy(update={"open_world_hint": True})),
             (tools.mission, _READS),
             (tools.watch, _READS),
-            (tools.stop, ToolAnnotations(idempotent_hint=True)),
-            (tools.change, ToolAnnotations(destructive_hint=True, idempotent_hint=True)),
+            (tools.stop, _ENDS),
+            (tools.change, _ENDS),
             (tools.results, _READS),
         ):
             self.add_tool(tool, annotations=hints, description=_description(tool))
@@ -112,11 +111,10 @@ class AgentServer(MCPServer[Any]):
         """
         known = {tool.name: tool.input_schema["properties"] for tool in await super().list_tools()}
         if name not in known:
-            raise ToolError(f"there is no tool {plain(name, 64)!r}{near(name, known)}")
-        for field in arguments.keys() - known[name].keys():
-            raise ToolError(
-                f"{name} has no argument {plain(field, 64)!r}{near(field, known[name])}"
-            )
+            name = _short(name)
+            raise ToolError(f"there is no tool {name!r}{near(name, known)}")
+        for field in map(_short, arguments.keys() - known[name].keys()):
+            raise ToolError(f"{name} has no argument {field!r}{near(field, known[name])}")
         try:
             return await super().call_tool(name, arguments, context)
         except UnexpectedToolError:
@@ -152,6 +150,10 @@ class AgentServer(MCPServer[Any]):
             return await self._callers.ask(call, question)
         except ToolError as error:
             raise ResourceError(str(error)) from None
+
+
+def _short(name: str) -> str:
+    return plain(name, 64)
 
 
 def _description(tool: Callable[..., Any]) -> str:

@@ -10,6 +10,8 @@ from typing import Any
 import jsonschema
 import pytest
 from agent_client import MODES, Service, called, document, played
+from hypothesis import given
+from hypothesis import strategies as st
 from mcp import Client
 from mcp.shared.exceptions import MCPError
 
@@ -170,3 +172,62 @@ def test_prompts_begin_tasks_in_the_safe_order() -> None:
     assert all("the field" in text for text in found.values())
     flying = [text for name, text in found.items() if "refusal" not in name]
     assert all("approval" in text for text in flying)
+
+
+_FIELDS = [
+    *("id", "x", "y", "z", "yaw", "heading_compass_deg", "waypoint_type", "actions", "type"),
+    *("format", "version", "navigation", "waypoints", "robot", "analyses", "sensors"),
+]
+_JSON = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(10**400), 10**400)
+    | st.floats()
+    | st.text(max_size=20)
+    | st.sampled_from(["p1", "m1", "drone", "local", "yaw", "../m1", "\u202e"]),
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.dictionaries(st.text(max_size=12) | st.sampled_from(_FIELDS), inner, max_size=6)
+    ),
+    max_leaves=25,
+)
+_ARGUMENTS = {
+    "catalogue": ["topic"],
+    "propose": ["document", "why", "parent", "minutes"],
+    "check": ["proposal"],
+    "watch": ["id", "until", "seconds"],
+    "stop": ["id", "how"],
+    "change": ["id", "robot", "waypoints", "why"],
+    "results": ["id", "part"],
+}
+_CALLS = st.sampled_from(sorted(_ARGUMENTS)).flatmap(
+    lambda tool: st.tuples(
+        st.just(tool),
+        st.dictionaries(st.sampled_from([*_ARGUMENTS[tool], "more"]), _JSON, max_size=5),
+    )
+)
+_WAYPOINTS = st.dictionaries(st.sampled_from(_FIELDS), _JSON, max_size=8)
+
+
+@given(st.lists(_CALLS, min_size=1, max_size=3), st.lists(_WAYPOINTS, max_size=3))
+def test_whatever_is_sent_nothing_crashes_and_no_drone_is_commanded(
+    calls: list[tuple[str, dict[str, Any]]], waypoints: list[dict[str, Any]]
+) -> None:
+    """A crash would answer with the tool's name alone; a good `stop` needs a mission that flies."""
+    service = Service()
+    service.put("m1", phase=MissionPhase.PROPOSED)
+    more: list[tuple[str, dict[str, Any]]] = [
+        ("propose", {"document": document(*waypoints), "why": ""}),
+        ("change", {"id": "m1", "robot": "drone", "waypoints": waypoints, "why": ""}),
+    ]
+
+    async def script(client: Client) -> None:
+        for tool, arguments in (*calls, *more):
+            given = {"seconds": 1, **arguments} if tool == "watch" else arguments
+            found = await client.call_tool(tool, given)
+            text = getattr(found.content[0], "text", "")
+            assert text != f"Error executing tool {tool}", (tool, arguments)
+            assert "\u202e" not in text
+
+    played(service, script)
+    assert not service.commands

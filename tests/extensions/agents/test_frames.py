@@ -68,6 +68,7 @@ def test_a_waypoint_is_local_and_has_its_heading() -> None:
         ({"waypoint_type": "relative"}, ["waypoint_type", "local"]),
         ({"heading_deg": 5}, ["heading_deg", HEADING]),
         ({"hight": 5}, ["hight"]),
+        ({"actions": [{"type": "aim_gimbal", "pich": 1}]}, ["actions.0.pich", "pitch"]),
         ({HEADING: 361}, [HEADING, "361"]),
         ({HEADING: "north"}, [HEADING]),
         ({HEADING: True}, [HEADING]),
