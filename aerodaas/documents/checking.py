@@ -45,17 +45,12 @@ def check_document(
     Returns:
         The findings, at most 100, and the forecasts; passed if nothing was found.
     """
-    checks = [
-        RouteCheck(
-            robot,
-            config,
-            [entry for entry in document.navigation if entry.robot == robot.id],
-            _planning_scheduler(document, config),
-            battery.get(robot.id, _simulated_charge(robot)),
-            minutes,
-        )
-        for robot in _navigated(document, config)
-    ]
+    checks = []
+    for robot in _navigated(document, config):
+        scheduler, certain = _planning_scheduler(document, config)
+        charge = battery.get(robot.id, _simulated_charge(robot))
+        entries = [entry for entry in document.navigation if entry.robot == robot.id]
+        checks.append(RouteCheck(robot, config, entries, scheduler, certain, charge, minutes))
     findings = list(islice(_findings(document, config, checks), _MOST))
     forecasts: list[RobotForecast] = [check.forecast for check in checks]
     return CheckReport(passed=not findings, findings=findings, forecasts=forecasts)
@@ -82,19 +77,20 @@ def _simulated_charge(robot: RobotConfig) -> float | None:
 
 def _planning_scheduler(
     document: MissionDocument, config: EnvironmentConfig
-) -> TrajectoryScheduler:
-    """The scheduler by which the way is forecast; the given order where that one is unknown.
+) -> tuple[TrajectoryScheduler, bool]:
+    """The scheduler by which the way is forecast, and whether the flight has the same.
 
-    A search for the best way takes seconds; the nearest waypoint first is never a shorter way.
+    A search for the best way takes seconds; the nearest waypoint first stands for it.
     """
     wanted = document.trajectory_scheduler
     name = config.schedulers.trajectory if wanted is None else wanted.name
     settings = {} if wanted is None else wanted.settings
     if name == "optimal":
-        return NearestNeighborScheduler()
+        return NearestNeighborScheduler(), False
     try:
         check_arguments("trajectory_schedulers", name, settings)
         made = load_plugin("trajectory_schedulers", name)(None, **settings)
     except AeroDaaSError:
-        return OrderedScheduler()
-    return made if isinstance(made, TrajectoryScheduler) else OrderedScheduler()
+        return OrderedScheduler(), False
+    known = isinstance(made, TrajectoryScheduler)
+    return (made if known else OrderedScheduler()), known

@@ -170,14 +170,10 @@ class GraphCheck:
             what = "flying robot" if trigger.command else "analysis"
             if trigger.target not in known:
                 yield _unknown(f"{what} (that {entry.id} triggers)", trigger.target, known)
-            if trigger.at_users_side:
-                text = f"the condition of {entry.id}'s trigger {number} is code at the user's side"
-                yield _finding(text, "take a condition that is data: Near, Above or Below")
-                continue
             try:
                 condition_adapter().validate_json(json.dumps(trigger.when))
             except ValidationError:
-                text = f"{entry.id}: trigger {number} has a condition that is not known here"
+                text = f"{entry.id}: trigger {number} has a condition that is code, or not known"
                 yield _finding(text, "take a condition that is data: Near, Above or Below")
 
     def _navigation(self) -> Iterator[Finding]:

@@ -21,7 +21,6 @@ from aerodaas.geometry.energy import EnergyModel
 from aerodaas.geometry.frames import Vector, length
 from aerodaas.geometry.free_path import FreeArea
 from aerodaas.messages.waypoints import HeightDatum, SchedulingType, Waypoint
-from aerodaas.mission.action_executor import action_objection
 from aerodaas.mission.commands import AddNavigation
 from aerodaas.mission.navigation.navigator import Navigator
 from aerodaas.mission.navigation.planner import InlinePlanner
@@ -64,6 +63,8 @@ class RouteCheck:
     entries: Sequence[NavigationDocument]
     """The document's navigation of this robot, in order."""
     scheduler: TrajectoryScheduler
+    certain: bool = True
+    """Whether the flight has this scheduler, so that it flies in the order that is planned here."""
     battery: float | None = None
     """Charge at the start, 0 to 1; None if it is not known, which counts as full."""
     minutes: float | None = None
@@ -143,14 +144,7 @@ class RouteCheck:
     ) -> Iterator[Finding]:
         """Findings about the way as a whole: its legs, charge, deadlines and length of time."""
         route = _Route(self.robot, fence, ground, self._start, self._energy)
-        order, left_out = route.order(admitted, self.scheduler, self._charge)
-        for waypoint_id in left_out:
-            yield self._finding(
-                "deadline",
-                f"the scheduler leaves {waypoint_id} out of its plan",
-                "give it a later deadline, or fewer waypoints",
-                waypoint=waypoint_id,
-            )
+        order = route.order(admitted, self.scheduler, self._charge)
         legs: list[_Leg] = []
         here = route.above_start
         for waypoint in order:
@@ -161,7 +155,7 @@ class RouteCheck:
             legs.append(leg)
             here = waypoint.position
         home = route.way_home(here)
-        yield from self._deadline_findings(route, order)
+        yield from self._deadline_findings(route, order, legs)
         yield from self._charge_findings(route, order, legs)
         yield from self._clearance_findings([*legs, home])
         seconds = route.climb.seconds + sum(leg.seconds for leg in (*legs, home))
@@ -203,24 +197,30 @@ class RouteCheck:
             place=_triple(waypoint.position),
         )
 
-    def _deadline_findings(self, route: _Route, order: Sequence[Waypoint]) -> Iterator[Finding]:
-        """Deadlines that not even the straight way from the start meets."""
-        for waypoint in order:
-            if waypoint.deadline is None:
-                continue
-            way = waypoint.position - route.above_start
-            reach = self._limits.arrival_radius
-            distance, up = (max(0.0, one - reach) for one in (length(way), float(way[2])))
-            direct = route.climb.seconds + route.seconds(distance, up, waypoint)
-            if direct > waypoint.deadline:
+    def _deadline_findings(
+        self, route: _Route, order: Sequence[Waypoint], legs: Sequence[_Leg]
+    ) -> Iterator[Finding]:
+        """Deadlines that the way as planned misses, or that not even the straight way meets."""
+        ended = route.climb.seconds
+        for waypoint, leg in zip(order, legs, strict=True):
+            reach = self._limits.arrival_radius / self._limits.max_speed
+            ended += leg.seconds
+            arrival, way = ended - waypoint.hover_duration - reach, "by the planned way"
+            if not self.certain:
+                climb = float(waypoint.position[2] - route.above_start[2])
+                direct = length(waypoint.position - route.above_start)
+                arrival = route.climb.seconds + route.seconds(direct, climb, waypoint) - reach
+                way = "by the straight way"
+            if waypoint.deadline is not None and arrival > waypoint.deadline:
                 yield self._finding(
                     "deadline",
-                    f"{waypoint.id!r} is reached after {direct:.0f} s by the straight way, and its "
+                    f"{waypoint.id!r} is reached after {arrival:.0f} s {way}, and its "
                     f"deadline is {waypoint.deadline:g} s",
-                    f"give it a deadline of {math.ceil(direct)} s or more, or a greater speed",
+                    "fly there earlier or faster, or give it a deadline of "
+                    f"{math.ceil(arrival)} s or more",
                     waypoint=waypoint.id,
                     place=_triple(waypoint.position),
-                    measured=direct,
+                    measured=arrival,
                     limit=waypoint.deadline,
                     unit="s",
                 )
@@ -315,8 +315,8 @@ class _Route:
         admitted: Sequence[tuple[AddNavigation, Mapping[str, Waypoint]]],
         scheduler: TrajectoryScheduler,
         charge: float,
-    ) -> tuple[list[Waypoint], list[str]]:
-        """Waypoints in the order flown, and the ids that the scheduler leaves out."""
+    ) -> list[Waypoint]:
+        """Waypoints in the order flown."""
         limits = self._robot.limits
         navigator = Navigator(
             InlinePlanner(scheduler),
@@ -341,7 +341,6 @@ class _Route:
                 above_ground={},
             )
         order: list[Waypoint] = []
-        left_out: list[str] = []
         here, now = self.above_start, self.climb.seconds
         while (stop := navigator.queue.head) is not None:
             situation = PlanningContext(
@@ -353,7 +352,7 @@ class _Route:
                 energy=self._energy,
                 reserve=limits.battery_land,
             )
-            left_out += navigator.plan(situation) or []
+            navigator.plan(situation)
             stop = navigator.queue.head
             if stop is None:
                 break
@@ -363,7 +362,7 @@ class _Route:
             now += stop.waypoint.hover_duration
             here = stop.waypoint.position
             navigator.finish(stop)
-        return order, left_out
+        return order
 
     def seconds(self, distance: float, up: float, waypoint: Waypoint) -> float:
         """Least time to a waypoint, seconds.
@@ -518,9 +517,6 @@ class _PlaceCheck:
                 limit=limits.max_speed,
                 unit="m/s",
             )
-        if objection := action_objection(waypoint, self._robot):
-            remedy = "leave the action out, or take another robot"
-            yield self._finding("document", name, place, f"{where}: {objection}", remedy)
 
     def _level_reasons(self, name: str, where: str, place: Vector) -> Iterator[Finding]:
         fence = self._robot.limits.geofence

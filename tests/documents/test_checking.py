@@ -105,7 +105,6 @@ def test_a_mission_within_all_limits_passes_with_a_forecast_of_its_way() -> None
         ({"z": 0.1}, "floor", 0.1, 0.3),
         ({"x": 39, "y": 39}, "range", math.hypot(39, 39, 3), 50),
         ({"speed": 9}, "speed", 9, 6),
-        ({"deadline": 1.5}, "deadline", 1 + (math.hypot(5, 1.5) - 0.3) / 4, 1.5),
     ],
 )
 def test_a_waypoint_beyond_a_limit_is_found_with_place_and_figures(
@@ -163,6 +162,40 @@ def test_the_lease_has_to_last_until_the_landing() -> None:
     assert check_document(stay, config(), minutes=3).passed
     found = only(check_document(stay, config(), minutes=2))
     assert (found.check, found.limit, found.unit) == ("lease", 120, "s")
+
+
+def test_a_charge_that_allows_no_take_off_is_found_whatever_is_flown() -> None:
+    """The way is an analysis', and 18 % are less than what a take-off needs."""
+    follow = followed(analysis("CarFollowAnalytics"))
+    assert check_document(follow, config(), battery={"drone": 0.5}).passed
+    found = only(check_document(follow, config(), battery={"drone": 0.18}))
+    assert (found.check, found.measured, found.limit) == ("battery", 18, 25)
+
+
+@pytest.mark.parametrize(("order", "passes"), [("ab", True), ("ba", False)])
+def test_deadlines_hold_for_the_way_as_planned(order: str, *, passes: bool) -> None:
+    """The near waypoint after the far one is late; a scheduler that heeds deadlines turns them."""
+    stops = {"a": {"id": "a", "x": 4, "deadline": 5}, "b": {"id": "b", "x": 30}}
+    asked = [stops[one] for one in order]
+    report = check_document(mission(*asked), config())
+    assert report.passed is passes
+    if not passes:
+        found = only(report)
+        assert (found.check, found.waypoint, found.limit) == ("deadline", "a", 5)
+        heeding = mission(*asked).navigation[0].model_copy(update={"ordered": False})
+        for scheduler in ("deadline", "optimal"):
+            document = mission(*asked, trajectory_scheduler={"name": scheduler})
+            document = document.model_copy(update={"navigation": [heeding]})
+            assert check_document(document, config()).passed
+
+
+@pytest.mark.parametrize("scheduler", ["ordered", "optimal"])
+def test_a_deadline_that_no_way_meets_is_found(scheduler: str) -> None:
+    """Before the drone can be there at all."""
+    late = mission({"deadline": 1.5}, trajectory_scheduler={"name": scheduler})
+    found = only(check_document(late, config()))
+    assert (found.check, found.limit) == ("deadline", 1.5)
+    assert found.measured == pytest.approx(1 + math.hypot(5, 1.5) / 4, abs=0.1)
 
 
 @pytest.mark.parametrize("name", ["PersonFollowAnalytics", "CarFollowAnalytics"])
@@ -249,6 +282,7 @@ UNKNOWN: list[tuple[MissionDocument, str]] = [
     (mission({}, trajectory_scheduler={"name": "optimal", "settings": {"buget": 1}}), "budget"),
     (mission({}, analytics_scheduler="demms"), "dems"),
     (mission({}, navigation=[{"robot": "drone", "stream": "drone/it"}]), "known"),
+    (watched({**analysis("CrowdDensityAnalytics"), "triggers": [{"target": "drone/that"}]}), "it"),
     (
         watched({**analysis("GpsLoggerAnalytics", source={"$property": ["log", "pth"]})}),
         "path",
@@ -265,9 +299,13 @@ def test_an_unknown_name_is_found_with_the_nearest_known(
     assert [one for one in found if one.check == "unknown_name" and nearest in one.text]
 
 
+TWICE = {"robot": "drone", "waypoints": [{"id": "a", "x": 1, "y": 1, "z": 2}]}
+READ = {**analysis("OnnxDetector"), "id": "drone/read"}
+READER = {**analysis("CrowdDensityAnalytics"), "reads": ["drone/read"]}
 WRONG: list[MissionDocument] = [
     mission(navigation=[]),
     mission({}, {"id": "wp0"}),
+    mission({}, navigation=[TWICE, TWICE]),
     mission({}, navigation=[{"robot": "drone"}]),
     mission({"waypoint_type": "global", "x": 47, "y": 8}),
     mission({"actions": [{"type": "move_actuator", "actuator": "hook", "position": "open"}]}),
@@ -278,6 +316,10 @@ WRONG: list[MissionDocument] = [
     watched({**analysis("CrowdDensityAnalytics"), "id": "it", "reads": []}),
     watched({**analysis("CrowdDensityAnalytics"), "task": {"benefit": -1}}),
     watched({**analysis("CrowdDensityAnalytics"), "triggers": [CONDITION]}),
+    watched(
+        {**analysis("CrowdDensityAnalytics"), "triggers": [{**CONDITION, "when": {"$here": 0}}]}
+    ),
+    mission({}, sensors=["drone/cam"], analyses=[READER, READ]),
     watched({"id": "drone/it", "here": {"produces": "bool"}, "reads": ["drone/cam"]}),
     followed(analysis("CrowdDensityAnalytics")),
 ]

@@ -10,8 +10,12 @@ from flying import FLAT, Flyer, recorded, robot
 from numpy.typing import NDArray
 
 from aerodaas import AeroNavigation, Environment, Waypoint
+from aerodaas.config.model import validated
+from aerodaas.dataflow.mission_document import MissionDocument
+from aerodaas.documents.checking import check_document
 from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.messages.vehicle import VehicleMode
+from aerodaas.protocol.proposals import CheckReport
 from aerodaas.recording.reader import Recording, vehicle_states
 from aerodaas.terrain.ground import Ground
 from aerodaas.terrain.terrain import Terrain
@@ -80,3 +84,21 @@ def test_a_flight_over_hills_keeps_its_clearance(flyer: Flyer) -> None:
     leg = [index for index, p in enumerate(truth) if index < reached and p[0] > 80.0]
     assert above[leg].min() > 25.0 - 1.5
     assert above[leg].max() < 25.0 + 3.0
+
+
+def test_a_waypoint_too_near_to_the_ground_is_found_without_flying(flyer: Flyer) -> None:
+    """The remedy is a height that passes."""
+    hilly = _hilly(flyer)
+    hilly["terrain"]["files"] = [str(flyer.folder / "N47E008.hgt")]
+    environment = validated(hilly, "the hills")
+
+    def check(up: float) -> CheckReport:
+        stop = {"id": "low", "x": 400, "y": 120, "z": up, "waypoint_type": "local"}
+        navigation = [{"robot": "drone", "waypoints": [stop]}]
+        content = {"format": "aerodaas-mission", "version": 1, "navigation": navigation}
+        return check_document(MissionDocument.model_validate(content), environment)
+
+    (found,) = check(12.0).findings
+    assert (found.check, found.waypoint, found.measured) == ("ground", "low", 12.0)
+    assert found.limit is not None
+    assert check(found.limit + 0.1).passed
