@@ -8,10 +8,11 @@ import numpy as np
 
 from aerodaas.clock import host_time_ns, seconds
 from aerodaas.dataflow.mission_document import MissionDocument, NavigationDocument
-from aerodaas.errors import AeroDaaSError, InvalidWaypointError
+from aerodaas.errors import InvalidWaypointError
 from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.messages.mission import MissionState, Place, RobotStatus
 from aerodaas.messages.waypoints import Waypoint, WaypointType
+from aerodaas.mission.commands import Answer
 from aerodaas.protocol.proposals import ApprovalOut, ChangeIn
 from aerodaas.protocol.schemas import MissionPhase, NavigationIn, VerdictOut
 from aerodaas.service.errors import RefusedError
@@ -107,7 +108,7 @@ class FlightChanges:
         minutes = (seconds(status.mission.stamp) + verdict.seconds) / _MINUTE
         return envelope_violation(allowed.envelope, places, minutes)
 
-    def apply(self, host: ActiveMission, document: MissionDocument) -> str:
+    def apply(self, host: ActiveMission, document: MissionDocument) -> Answer:
         """Have a robot fly a change's waypoints in the place of its own.
 
         Args:
@@ -115,17 +116,16 @@ class FlightChanges:
             document: Document of the change.
 
         Returns:
-            Why it does not; empty if it does.
+            The robot's own answer.
+
+        Raises:
+            AeroDaaSError: If it takes no other waypoints now, or the flight does not answer.
         """
         entry = document.navigation[0]
         wanted = NavigationIn(robot=entry.robot, waypoints=entry.waypoints[1:], clear_first=True)
-        try:
-            self._present(host, entry.robot)
-            # As its user: after the end of the lease, the flight obeys operators alone.
-            answer = host.follow().fly(wanted, operator=False)
-        except AeroDaaSError as error:
-            return str(error)
-        return "" if answer.accepted and not answer.refused else answer.text or "it was refused"
+        self._present(host, entry.robot)
+        # As its user: after the end of the lease, the flight obeys operators alone.
+        return host.follow().fly(wanted, operator=False)
 
     def _present(self, host: ActiveMission, robot: str) -> tuple[Place, RobotStatus]:
         """Place and status of a robot that takes other waypoints; raises RefusedError otherwise."""

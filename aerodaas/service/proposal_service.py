@@ -16,6 +16,7 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.documents.checking import check_document
 from aerodaas.errors import AeroDaaSError
+from aerodaas.mission.commands import Answer
 from aerodaas.protocol.proposals import (
     ApprovalIn,
     ApprovalOut,
@@ -56,6 +57,8 @@ __all__ = ["ProposalService"]
 
 _MOST_PROPOSALS = 20
 """Most proposals of an account that are not over: each is a folder, and a line for a person."""
+_MOST_WAYPOINTS = 2000
+"""Most waypoints of a proposal: a check of more keeps a core busy for seconds."""
 _HOUR, _MINUTE = 3600.0, 60.0
 _CHECK_PATIENCE = 10.0
 """Wall seconds for which a check waits for others."""
@@ -339,13 +342,16 @@ class ProposalService:
         try:
             document = self._changes.renewed(host, active.document())
             self._require_checked(active.row, document)
-            reason = self._changes.apply(host, document)
+            answer = self._changes.apply(host, document)
         except AeroDaaSError as error:
-            reason = str(error)
-        if reason:
-            self._end(active, MissionPhase.REFUSED, reason)
-        else:
-            self._end(active, MissionPhase.APPLIED, f"{host.row.id} flies it")
+            answer = Answer(accepted=False, text=str(error))
+        if not answer.accepted:
+            self._end(active, MissionPhase.REFUSED, answer.text)
+            return
+        told = f"{host.row.id} flies it"
+        if answer.refused:
+            told += f" without {len(answer.refused)} waypoints, which the drone has refused"
+        self._end(active, MissionPhase.APPLIED, told)
 
     def _end(self, active: ActiveMission, phase: MissionPhase, reason: str) -> None:
         told = f"{self._hash(active, active.document())} {phase.value}: {reason}"
@@ -626,7 +632,11 @@ class ProposalService:
 
 
 def _require_flyable_alone(document: MissionDocument) -> None:
-    """Raise RefusedError for a document that needs somebody at the user's side."""
+    """Raise RefusedError for a document that is too long, or needs somebody at its user's side."""
+    if sum(len(entry.waypoints) for entry in document.navigation) > _MOST_WAYPOINTS:
+        raise RefusedError(
+            422, f"a proposal has at most {_MOST_WAYPOINTS} waypoints: propose it in parts"
+        )
     if here := document.here:
         raise RefusedError(
             422,

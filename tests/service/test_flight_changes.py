@@ -148,6 +148,14 @@ def test_what_the_drone_refuses_is_not_applied(provider: ProposedTo) -> None:
     assert (found.phase, "returning" in found.reason) == (MissionPhase.REFUSED, True)
 
 
+def test_waypoints_that_the_drone_refuses_are_told(provider: ProposedTo) -> None:
+    """It flies the others."""
+    mission, flight = provider.flown()
+    flight.answer = Answer(accepted=True, refused={"new1": "outside the fence"})
+    found = provider.judged(provider.change(mission, (5, 5, 3), (6, 6, 3)))
+    assert (found.phase, "without 1" in found.reason) == (MissionPhase.APPLIED, True)
+
+
 def test_only_its_proposer_changes_a_mission(provider: ProposedTo) -> None:
     """Another agent of the tenant is refused, and to a stranger there is none."""
     mission, _ = provider.flown()

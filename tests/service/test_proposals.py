@@ -333,8 +333,18 @@ def test_an_agent_has_some_rehearsals_within_an_hour(
             ]
         },
         {"sensors": ["one/lidar"]},
+        {
+            "navigation": [
+                {
+                    "robot": "one",
+                    "waypoints": [
+                        {"id": f"w{n}", "x": 0.0, "y": 0.0, "z": 2.0} for n in range(2001)
+                    ],
+                }
+            ]
+        },
     ],
-    ids=["user's side", "property", "unknown"],
+    ids=["user's side", "property", "unknown", "long"],
 )
 def test_what_cannot_be_flown_here_alone_is_not_proposed(
     provider: ProposedTo, changes: dict[str, object]
