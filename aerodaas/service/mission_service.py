@@ -52,7 +52,7 @@ from aerodaas.service.mission import (
 from aerodaas.service.mission_table import MissionTable
 from aerodaas.service.models.model_store import ModelStore, require_room
 from aerodaas.service.monitor.process import FleetMonitor
-from aerodaas.service.proposal_service import ProposalService
+from aerodaas.service.proposals.service import ProposalService
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store
 

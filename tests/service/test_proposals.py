@@ -168,15 +168,19 @@ def test_an_approval_lapses_after_ten_minutes(provider: ProposedTo, seconds: flo
             provider.missions.proposals.request_approval(AGENT, found.id)
 
 
-def test_a_request_lapses_after_half_an_hour(provider: ProposedTo) -> None:
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_request_lapses_after_half_an_hour(provider: ProposedTo, *, turns: bool) -> None:
     """Nobody approves by a rehearsal of another weather."""
     requested = provider.requested()
     provider.later += 1700.0
     provider.turns(1)
     assert provider.phase(requested) is MissionPhase.AWAITING_APPROVAL
     provider.later += 200.0
-    with pytest.raises(RefusedError, match="rehearse it again"):
-        provider.approve(requested)
+    if turns:
+        provider.turns(1)
+    else:
+        with pytest.raises(RefusedError, match="rehearse it again"):
+            provider.approve(requested)
     assert provider.phase(requested) is MissionPhase.PROPOSED
 
 

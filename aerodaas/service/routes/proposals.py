@@ -12,7 +12,7 @@ from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
-from aerodaas.service.proposal_service import ProposalService
+from aerodaas.service.proposals.service import ProposalService
 
 __all__ = ["ProposalRoutes"]
 

@@ -19,7 +19,7 @@ from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.orders import FlightOrder, actuators_of
 from aerodaas.service.mission import ActiveMission
-from aerodaas.service.proposals import envelope_violation
+from aerodaas.service.proposals.record import envelope_violation
 
 __all__ = ["FlightChanges"]
 

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import math
 import secrets
-import threading
 import time
 from collections import defaultdict, deque
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
-from aerodaas.clock import WallOffset
-from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.mission_document import MissionDocument
-from aerodaas.documents.checking import check_document
 from aerodaas.errors import AeroDaaSError
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.proposals import (
@@ -29,27 +24,21 @@ from aerodaas.protocol.schemas import MissionIn, MissionOut, MissionPhase, Verdi
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.fleet.fleet_registry import FleetRegistry
-from aerodaas.service.flight_changes import FlightChanges
-from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.orders import FlightOrder, FlightOrders, actuators_of
 from aerodaas.service.leases.lease_service import LeaseService
 from aerodaas.service.mission import ActiveMission, fingerprint_of, shown
 from aerodaas.service.mission_table import MissionTable
 from aerodaas.service.models.model_store import require_room
-from aerodaas.service.proposals import (
+from aerodaas.service.proposals.changes import FlightChanges
+from aerodaas.service.proposals.conditions import FlightConditions, hash_of, record_of
+from aerodaas.service.proposals.record import (
     APPROVAL_SECONDS,
-    CHARGE_POINTS,
     VERDICT_SECONDS,
-    Conditions,
     ProposalRecord,
-    difference,
     encloses,
-    lapse_reason,
     plain_text,
-    proposal_hash,
-    records_of,
-    summary_of,
 )
+from aerodaas.service.proposals.summary import difference, records_of, summary_of
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Mission, Store
 
@@ -60,8 +49,6 @@ _MOST_PROPOSALS = 20
 _MOST_WAYPOINTS = 2000
 """Most waypoints of a proposal: a check of more keeps a core busy for seconds."""
 _HOUR, _MINUTE = 3600.0, 60.0
-_CHECK_PATIENCE = 10.0
-"""Wall seconds for which a check waits for others."""
 _MOST_COMPARED = 100
 """Newest missions of a tenant among which the last approved one of the same name is looked for."""
 
@@ -92,7 +79,7 @@ class ProposalService:
         self._registry = registry
         self._clock = clock
         self._changes = FlightChanges()
-        self._checking = threading.Lock()
+        self._conditions = FlightConditions(settings, orders, registry, clock)
         self._rehearsals: dict[str, deque[float]] = defaultdict(deque)
         """Moments of the rehearsals of the last hour, by account."""
         self.audit: Callable[[str, Mission, str], None] = lambda _action, _row, _text: None
@@ -124,7 +111,7 @@ class ProposalService:
             fingerprint=fingerprint_of(proposal.model_copy(update={"why": ""})),
         )
         record = ProposalRecord(
-            conditions=self._conditions(robots, self._orders.rehearsal(row)),
+            conditions=self._conditions.present(robots, self._orders.rehearsal(row)),
             parent=proposal.parent,
             why=plain_text(proposal.why),
             difference=self._difference(row, document, proposal.parent),
@@ -147,7 +134,7 @@ class ProposalService:
                 against these, or after too many rehearsals of an hour.
         """
         host = self._own(principal, mission)
-        before = self._record(host)
+        before = record_of(host)
         document = self._changes.document(host, change, before.approval)
         lease = None if host.row.lease is None else self._leases.lease(host.row.lease)
         left = 0.0 if lease is None or lease.ends is None else lease.ends - self._leases.now()
@@ -160,12 +147,12 @@ class ProposalService:
             fingerprint=fingerprint_of(change.model_copy(update={"why": ""})),
         )
         record = ProposalRecord(
-            conditions=self._conditions(row.robots, self._orders.rehearsal(row)),
+            conditions=self._conditions.present(row.robots, self._orders.rehearsal(row)),
             change_of=mission,
             why=plain_text(change.why),
             difference=self._difference(row, document, mission),
         )
-        self._require_checked(row, document)
+        self._conditions.require_checked(row, document)
         return self._added(row, document, record)
 
     def _row(
@@ -198,7 +185,7 @@ class ProposalService:
             ]
             for active in own:
                 same = active.row.fingerprint == row.fingerprint
-                if same and self._record(active).change_of == record.change_of:
+                if same and record_of(active).change_of == record.change_of:
                     return active
             if len(own) >= _MOST_PROPOSALS:
                 raise RefusedError(
@@ -225,27 +212,7 @@ class ProposalService:
         active = self._table.seen(principal, mission)
         if not active.is_proposal:
             raise RefusedError(409, f"{mission} is no proposal: it was submitted to be flown")
-        return self._report(active.row, active.document())
-
-    def _report(self, row: Mission, document: MissionDocument) -> CheckReport:
-        order = self._orders.rehearsal(row)
-        config = environment_of(order.model_copy(update={"rehearsal": False}))
-        # One at a time: each takes a core, which flights and the service need.
-        if not self._checking.acquire(timeout=_CHECK_PATIENCE):
-            text = "other proposals are being checked: ask again in a moment"
-            raise RefusedError(429, text, retry_after=_CHECK_PATIENCE)
-        try:
-            return check_document(document, config, battery=order.battery, minutes=order.minutes)
-        finally:
-            self._checking.release()
-
-    def _require_checked(self, row: Mission, document: MissionDocument) -> None:
-        """Raise RefusedError for a document with findings: a rehearsal would only take longer."""
-        report = self._report(row, document)
-        if not report.passed:
-            first, *others = report.findings
-            more = f" ({len(others)} more findings)" if others else ""
-            raise RefusedError(409, f"its check found: {first.text}; {first.remedy}{more}")
+        return self._conditions.report(active.row, active.document())
 
     def rehearse(self, principal: Principal, mission: str, seeds: int) -> MissionOut:
         """Have a proposal flown in simulation; one that is being rehearsed goes on.
@@ -261,12 +228,12 @@ class ProposalService:
         """
         phases = (MissionPhase.PROPOSED, MissionPhase.REHEARSING)
         active = self._own(principal, mission, *phases)
-        self._require_checked(active.row, active.document())
+        self._conditions.require_checked(active.row, active.document())
         with self._table.lock:
             active = self._own(principal, mission, *phases)
             if active.phase is MissionPhase.PROPOSED:
                 self._count_rehearsal(principal.account)
-                record = self._record(active).model_copy(update={"seeds": seeds})
+                record = record_of(active).model_copy(update={"seeds": seeds})
                 active.forget_rehearsal()
                 self._set(active, MissionPhase.REHEARSING, "", record, verdict=None)
             return self.shown(active)
@@ -291,10 +258,10 @@ class ProposalService:
         """Keep the conditions of a rehearsal that begins, if it is a proposal's."""
         if not active.is_proposal:
             return
-        record = self._record(active)
+        record = record_of(active)
         if (host := self._host(record)) is not None:
             active.write(self._changes.renewed(host, active.document()))
-        conditions = self._conditions(order.robots, order)
+        conditions = self._conditions.present(order.robots, order)
         self._keep(active, record.model_copy(update={"conditions": conditions}))
 
     def judge(self, active: ActiveMission, verdict: VerdictOut) -> None:
@@ -302,7 +269,7 @@ class ProposalService:
 
         A change is applied, waits for an approval, or is over.
         """
-        record, kept = self._record(active), verdict.model_dump(mode="json")
+        record, kept = record_of(active), verdict.model_dump(mode="json")
         if (host := self._host(record)) is None:
             reason = "its rehearsal was good: request its approval"
             if not verdict.approved:
@@ -310,10 +277,10 @@ class ProposalService:
             active.set_phase(MissionPhase.PROPOSED, reason, verdict=kept)
             return
         active.change(verdict=kept)
-        allowed = self._record(host).approval
+        allowed = record_of(host).approval
         if not verdict.approved:
             self._end(active, MissionPhase.REFUSED, "; ".join(verdict.reasons))
-        elif reason := self._lapse(active, limits=True):
+        elif reason := self._conditions.lapse(active, limits=True):
             self._lapse_now(active, reason)
         else:
             objection = "no changes were approved beforehand"
@@ -328,7 +295,7 @@ class ProposalService:
 
     def cancel_obsolete(self, active: ActiveMission) -> bool:
         """Cancel a change whose mission is over; returns whether it is one."""
-        if not active.is_proposal or (name := self._record(active).change_of) is None:
+        if not active.is_proposal or (name := record_of(active).change_of) is None:
             return False
         host = self._table.missions.get(name)
         if host is not None and host.phase is MissionPhase.FLYING:
@@ -341,7 +308,7 @@ class ProposalService:
         """Have a change flown, if its way from where the robot is now has no findings either."""
         try:
             document = self._changes.renewed(host, active.document())
-            self._require_checked(active.row, document)
+            self._conditions.require_checked(active.row, document)
             answer = self._changes.apply(host, document)
         except AeroDaaSError as error:
             answer = Answer(accepted=False, text=str(error))
@@ -354,7 +321,7 @@ class ProposalService:
         self._end(active, MissionPhase.APPLIED, told)
 
     def _end(self, active: ActiveMission, phase: MissionPhase, reason: str) -> None:
-        told = f"{self._hash(active, active.document())} {phase.value}: {reason}"
+        told = f"{hash_of(active, active.document())} {phase.value}: {reason}"
         self.audit("proposal.end", active.row, told)
         active.set_phase(phase, reason, ended=time.time())
 
@@ -389,7 +356,7 @@ class ProposalService:
                 minutes * len(active.row.robots),
                 cloud=self._orders.may_call_cloud(document),
             )
-            record = self._record(active)
+            record = record_of(active)
             told = self._difference(active.row, document, record.parent)
             record = record.model_copy(update={"difference": told})
             phase = MissionPhase.AWAITING_APPROVAL
@@ -422,8 +389,8 @@ class ProposalService:
                 409, f"{row.id} is a proposal: approve it by the hash that it is shown with"
             )
         self._require_valid(active)
-        document, record = active.document(), self._record(active)
-        present = self._hash(active, document)
+        document, record = active.document(), record_of(active)
+        present = hash_of(active, document)
         if approval.hash != present:
             raise RefusedError(
                 409,
@@ -440,7 +407,7 @@ class ProposalService:
                 "the envelope's area encloses nothing or crosses itself: name its corners in "
                 "their order",
             )
-        at = self._unix(record.conditions)
+        at = self._conditions.unix(record.conditions)
         given = ApprovalOut(
             account=principal.account,
             at=at,
@@ -464,7 +431,7 @@ class ProposalService:
                 never lapses.
             limits: Whether to look at the limits and the document, too, as before a take-off.
         """
-        if not active.is_proposal or not (reason := self._lapse(active, limits=limits)):
+        if not active.is_proposal or not (reason := self._conditions.lapse(active, limits=limits)):
             return False
         self._lapse_now(active, reason)
         return True
@@ -474,10 +441,10 @@ class ProposalService:
         found = shown(active)
         if not active.is_proposal:
             return found
-        document, record = active.document(), self._record(active)
+        document, record = active.document(), record_of(active)
         minutes = float(active.row.request["minutes"])
         proposal = ProposalOut(
-            hash=self._hash(active, document),
+            hash=hash_of(active, document),
             document=document,
             minutes=minutes,
             parent=record.parent,
@@ -495,61 +462,24 @@ class ProposalService:
     def approved_hash(self, mission: str) -> str:
         """Hash by which a mission that is not over was approved; empty for any other."""
         active = self._table.missions.get(mission)
-        approval = self._record(active).approval if active and active.is_proposal else None
+        approval = record_of(active).approval if active and active.is_proposal else None
         return "" if approval is None else approval.hash
 
     def _require_valid(self, active: ActiveMission) -> None:
         """Raise RefusedError for a verdict that says nothing any more; it is forgotten then."""
-        if reason := self._lapse(active, limits=True):
+        if reason := self._conditions.lapse(active, limits=True):
             told = self._lapse_now(active, reason)
             raise RefusedError(409, told)
 
-    def _lapse(self, active: ActiveMission, *, limits: bool) -> str:
-        """Why a proposal's verdict or approval is not good any more; empty if it is."""
-        record = self._record(active)
-        approval, rehearsed = record.approval, record.conditions
-        if active.phase is MissionPhase.QUEUED and approval is None:
-            return "there is none"
-        since, longest = rehearsed.at, VERDICT_SECONDS
-        if approval is not None:
-            since, longest = approval.at, APPROVAL_SECONDS
-        age = self._clock() - rehearsed.offset.monotonic(since)
-        if not 0 <= age + 1.0 <= longest + 1.0:
-            return f"it is {age:.0f} s old, and is good for {longest:.0f} s"
-        order = self._orders.rehearsal(active.row) if limits else None
-        present = self._conditions(active.row.robots, order)
-        if reason := lapse_reason(rehearsed, present, self._spare(active, record)):
-            return reason
-        if (
-            limits
-            and approval is not None
-            and approval.hash != self._hash(active, active.document())
-        ):
-            return "the proposal is another one"
-        return ""
-
-    def _spare(self, active: ActiveMission, record: ProposalRecord) -> float:
-        """Share of a full charge that a robot may have lost since its rehearsal.
-
-        In flight that is what the rehearsal has brought home beyond the robot's reserve.
-        """
-        used = None if active.row.verdict is None else active.row.verdict["battery_used"]
-        charge = list(record.conditions.battery.values())
-        if record.change_of is None or used is None or not charge:
-            return CHARGE_POINTS
-        (robot,) = active.row.robots
-        limits = next(one.limits for one in self._settings.config.robots if one.id == robot)
-        return max(0.0, charge[0] - used - limits.battery_return)
-
     def _lapse_now(self, active: ActiveMission, reason: str) -> str:
         """Have a proposal go on from its beginning; returns the reason in words."""
-        record = self._record(active)
+        record = record_of(active)
         what = "approval" if record.approval is not None else "rehearsal"
         told = f"the {what} has lapsed: {reason}: rehearse it again"
         if record.change_of is not None:
             self._end(active, MissionPhase.REFUSED, told)
             return told
-        self.audit("proposal.lapse", active.row, f"{self._hash(active, active.document())} {told}")
+        self.audit("proposal.lapse", active.row, f"{hash_of(active, active.document())} {told}")
         self._leases.give_back(active.row)
         active.handing_over = False
         record = record.model_copy(update={"approval": None})
@@ -592,31 +522,6 @@ class ProposalService:
             )
         return active
 
-    def _record(self, active: ActiveMission) -> ProposalRecord:
-        return ProposalRecord.model_validate(active.row.request["proposal"])
-
-    def _hash(self, active: ActiveMission, document: MissionDocument) -> str:
-        minutes = float(active.row.request["minutes"])
-        return proposal_hash(document, self._record(active), minutes, active.row.verdict)
-
-    def _unix(self, conditions: Conditions) -> float:
-        """The present moment in Unix seconds, by the wall clock that the conditions have."""
-        return self._clock() - conditions.offset.monotonic(0.0)
-
-    def _conditions(self, robots: Collection[str], order: FlightOrder | None) -> Conditions:
-        """Charge and wind now, and the limits by an order; no limits without it."""
-        offset = WallOffset.read()
-        reports = [self._registry.report(name).wind for name in robots]
-        simulation = self._settings.config.simulation
-        simulated = math.hypot(*simulation.wind[:2]) + 2.0 * simulation.gust
-        return Conditions(
-            at=self._clock() + offset.seconds,
-            offset=offset,
-            battery=self._orders.charges(robots),
-            wind=max([simulated, *(wind for wind in reports if wind is not None)]),
-            limits={} if order is None else _limits(environment_of(order)),
-        )
-
     def _difference(self, row: Mission, document: MissionDocument, parent: str | None) -> list[str]:
         """What differs from the last approved mission of the same name, or from the parent."""
         newest = self._store.missions.newest(_MOST_COMPARED, row.tenant)
@@ -653,10 +558,3 @@ def _has_key(value: object, key: str) -> bool:
     if isinstance(value, dict):
         return key in value or any(_has_key(one, key) for one in value.values())
     return isinstance(value, list) and any(_has_key(one, key) for one in value)
-
-
-def _limits(config: EnvironmentConfig) -> dict[str, Any]:
-    """Limits of a flight by robot, and what the simulated wind is."""
-    limits = {robot.id: robot.limits.model_dump(mode="json") for robot in config.robots}
-    wind = config.simulation.model_dump(mode="json", include={"wind", "gust", "world"})
-    return {**limits, "the environment's world and wind": wind}

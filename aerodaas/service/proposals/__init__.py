@@ -1,0 +1,1 @@
+"""Proposals: missions that agents propose, and people approve before they fly."""
