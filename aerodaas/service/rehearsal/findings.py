@@ -231,9 +231,8 @@ def _near_misses(nearest: Iterable[ClearanceOut]) -> Iterator[Finding]:
         if one.distance >= CLEARANCE:
             continue
         what, place = f"{one.label} {one.thing}", _place(one.place)
-        event = (
-            f"hit {what}" if one.distance <= 0.0 else f"came to {one.distance:.1f} m from {what}"
-        )
+        near = f"came to {one.distance:.2f} m from {what}"
+        event = near if one.distance > 0.0 else f"hit {what}"
         yield Finding(
             f"{one.robot} {event} at {place}, {one.place[2]:.1f} m up, after {one.time:.1f} s, and "
             f"{CLEARANCE:g} m are to be kept: fly around it or higher",
