@@ -2,7 +2,8 @@
 
 `python -m tools.console_pictures` writes them to `docs/images`. It flies `vehicle_tracking` in
 simulation, once in real time to look on and once for the recording, and two drones of a provider's
-five. It opens the console of each in the browser that is installed.
+five. It has an agent propose an inspection. It opens the console of each in the browser that is
+installed.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from typing import IO
 import typer
 
 from aerodaas.environment.provider.client import ProviderClient
-from aerodaas.protocol.schemas import LeaseIn, MissionIn
+from aerodaas.protocol.proposals import ProposalIn
+from aerodaas.protocol.schemas import AccountIn, LeaseIn, MissionIn, Role, Scope, TokenIn
 from tools.browser import Browser, Page
 
 _ROOT = Path(__file__).resolve().parents[1]
@@ -38,6 +40,8 @@ _SERVICE = r"shown this once: (\S+)[\s\S]* at (http://\S+)"
 _FENCE = [[-30, -30], [60, -30], [60, 60], [-30, 60]]
 _AREA = [(-5.0, -5.0), (25.0, -5.0), (25.0, 25.0), (-5.0, 25.0)]
 _WAYS = {"alpha": ((20, 0), (20, 20), (0, 20), (0, 0)), "bravo": ((8, 40), (40, 40), (40, 8))}
+_MAST = ((0, 14, 6), (12, 26, 10), (24, 30, 14), (40, 24, 16), (36, 8, 10), (14, 4, 6))
+_WHY = "Lightning struck the mast on Friday: pictures of its upper half, from all sides."
 _FLYING = "document.querySelector('[data-row={}]')?.innerText.includes('enroute')"
 
 
@@ -66,6 +70,7 @@ def main() -> None:
                 page.until(_FOUND, _WAIT_SECONDS)
                 _take(page, name)
         _take_fleet(folder)
+        _take_approval(folder)
 
 
 def _take_fleet(folder: Path) -> None:
@@ -114,6 +119,54 @@ def _take_fleet(folder: Path) -> None:
             client.cancel(mission)
         while not all(client.mission(mission).phase.over for mission in missions):
             time.sleep(_SETTLED)
+
+
+def _take_approval(folder: Path) -> None:
+    """Have an agent propose the inspection of a mast, and take the picture of its page."""
+    environment = {
+        "name": "mast",
+        "robots": [
+            {
+                "id": "alpha",
+                "sensors": [{"id": "cam", "type": "camera", "rate": 1}],
+                "limits": {"geofence": {"polygon": _FENCE, "ceiling": 20}, "cruise_speed": 2},
+            }
+        ],
+        "simulation": {"world": "tower", "seed": 5, "wind": [2, 1, 0]},
+    }
+    file = folder / "mast.json"
+    file.write_text(json.dumps(environment))
+    words = ("serve", str(file), "--state", str(folder / "a"), "--port", "0")
+    with _told(*words, said=_SERVICE) as (token, url), Browser() as browser:
+        client = ProviderClient(url, token)
+        scopes = [Scope.PROPOSE, Scope.SENSE]
+        client.add_account(AccountIn(name="inspector", tenant="telecom", scopes=scopes))
+        client.add_account(AccountIn(name="olga", tenant="telecom", role=Role.OPERATOR))
+        tokens = [client.issue_token(TokenIn(account=one)).secret for one in ("inspector", "olga")]
+        agent = ProviderClient(url, tokens[0] or "")
+        proposed = ""
+        # The second one is compared with the first.
+        for number, ways in enumerate((_MAST[:-1], _MAST)):
+            document = {
+                "format": "aerodaas-mission",
+                "version": 1,
+                "name": "mast inspection",
+                "sensors": ["alpha/cam"],
+                "navigation": [{"robot": "alpha", "waypoints": [
+                    {"id": f"m{place}", "x": x, "y": y, "z": z, "waypoint_type": "local",
+                     "hover_duration": 3.0}
+                    for place, (x, y, z) in enumerate(ways)
+                ]}],
+            }  # fmt: skip
+            wanted = {"document": document, "why": _WHY, "parent": proposed if number else None}
+            proposed = agent.propose(ProposalIn.model_validate(wanted)).id
+        agent.rehearse(proposed)
+        while agent.mission(proposed).verdict is None:
+            time.sleep(_SETTLED)
+        agent.request_approval(proposed)
+        page = browser.open(f"{url}/#token={tokens[1]}&mission={proposed}", 1360, 900)
+        page.until("document.querySelector('[data-testid=picture]')?.naturalWidth > 0")
+        _take(page, "console-approval.webp")
 
 
 @contextmanager

@@ -98,5 +98,5 @@ def _overlay(
     if placed:
         entries.append(mark("reason of the refusal, by number", _REFUSED, "X"))
     count = f"{len(findings)} reason{'s' if len(findings) > 1 else ''}"
-    axes.set_title(f"Refused for {count}" if findings else "Approved")
+    axes.set_title(f"Refused for {count}" if findings else "No objection")
     return entries
