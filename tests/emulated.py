@@ -233,13 +233,10 @@ class Stepped:
         )
 
     def mission(
-        self,
-        stops: Sequence[Waypoint],
-        options: MissionConfig | None = None,
-        payload: object = None,
+        self, stops: Sequence[Waypoint], options: MissionConfig | None = None
     ) -> FlownMission:
-        """A mission to `stops` that was started; `payload` as a mission takes it."""
-        return FlownMission(self, stops, options, payload)
+        """A mission to `stops` that was started."""
+        return FlownMission(self, stops, options)
 
 
 Flight: TypeAlias = Callable[..., Stepped]
@@ -260,7 +257,6 @@ class FlownMission:
         ends: Stepped,
         stops: Sequence[Waypoint],
         options: MissionConfig | None = None,
-        payload: object = None,
     ) -> None:
         self.ends = ends
         ends.vehicle.use_clock(cast("Clock", self))
@@ -269,7 +265,7 @@ class FlownMission:
             ends.robot.model_copy(update=update),
             InlinePlanner(OrderedScheduler()),
             takeoff=ends.vehicle.read().odometry.position,
-            payload=payload,
+            vehicle=ends.vehicle,
         )
         self.neighbours: list[Neighbour] = []
         self.states: list[MissionState] = []

@@ -280,7 +280,7 @@ def flight(
         origin=origin,
         clearance=clearance,
         sea_level=sea_level,
-        payload=vehicle,
+        vehicle=vehicle,
     )
     prepared = Flight(vehicle, mission, SetpointLoop(vehicle, mission))
     for command in (*commands, *([Start()] if start else [])):

@@ -115,15 +115,14 @@ class Mission:
         obeyed: bool = True,
         clearance: GroundClearance | None = None,
         sea_level: float | None = None,
-        payload: object = None,
+        vehicle: object = None,
     ) -> None:
         """Plan with `planner` for a drone that stands at `takeoff`, ENU metres.
 
         `origin` pins global waypoints; `wind` (ENU m/s) is for the energy model. `obeyed` is False
         for a recorded vehicle, which lands when it landed in the recording. `clearance` is kept
-        above the ground; the local frame's zero lies `sea_level` metres above the sea; `payload` is
-        the vehicle that takes pictures and moves actuators. Raises ConfigError for an invalid
-        geofence.
+        above the ground; the local frame's zero lies `sea_level` metres above the sea; `vehicle` is
+        what extensions find their equipment at. Raises ConfigError for an invalid geofence.
         """
         self.limits = limits = robot.limits
         self.preflight = robot.preflight
@@ -134,7 +133,7 @@ class Mission:
         self._obeyed = obeyed
         self._machine = MissionStateMachine()
         self._log = MissionLog(f"{robot.id}/mission")
-        self._actions = ActionRunner(added_executors(payload, robot, self._log), self._log)
+        self._actions = ActionRunner(added_executors(vehicle, robot, self._log), self._log)
         self._meter = EnergyMeter(
             EnergyModel(limits.endurance, np.zeros(3) if wind is None else wind)
         )
@@ -155,7 +154,7 @@ class Mission:
         self._route = Route(self.fence, limits, self.home, clearance)
         self._cornering = Cornering(self._navigator, self._actions, self._route, limits)
         self.handover = make_handover(
-            HandoverContext(payload, robot, self._route, clearance, self._log)
+            HandoverContext(vehicle, robot, self._route, clearance, self._log)
         )
         self._command_handler = CommandHandler(self._navigator, self._log)
         self._assessment = CALM

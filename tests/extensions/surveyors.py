@@ -218,7 +218,7 @@ def fly_pictures(ends: Stepped, each: Callable[[Mission], None] = lambda _: None
         Waypoint("a", 3, 0, 2, gimbal_pitch=-math.pi / 2, photo=True),
         Waypoint("b", 3, 3, 2, gimbal_pitch=-0.5, gimbal_yaw=0.7, photo=True),
     ]
-    return ends.mission(stops, patience(4.0), ends.vehicle).fly(each)
+    return ends.mission(stops, patience(4.0)).fly(each)
 
 
 def surveying(
@@ -243,7 +243,7 @@ def simulated(*waypoints: Waypoint, noise: float, wind: float) -> Mission:
     vehicle.connect()
     planner = InlinePlanner(OrderedScheduler())
     place = vehicle.read().odometry.position
-    mission = Mission(robot, planner, takeoff=place, payload=vehicle)
+    mission = Mission(robot, planner, takeoff=place, vehicle=vehicle)
     loop = SetpointLoop(vehicle, mission)
     mission.handle(AddNavigation(AeroNavigation(data=waypoints)), 0)
     mission.handle(Start(), 0)

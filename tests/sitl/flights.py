@@ -112,7 +112,7 @@ class SitlFlight:
             InlinePlanner(NearestNeighborScheduler()),
             takeoff=takeoff,
             sea_level=self.vehicle.sea_level,
-            payload=self.vehicle,
+            vehicle=self.vehicle,
         )
         self.loop = SetpointLoop(self.vehicle, self.mission)
         self.states: list[MissionState] = []

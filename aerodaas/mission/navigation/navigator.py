@@ -47,7 +47,7 @@ class Navigator:
     ) -> None:
         """Plan with `planner` inside `fence`; `home` is the place of take-off, ENU metres.
 
-        `objection` says why the payload cannot do what a waypoint asks; empty if it can.
+        `objection` says why an action of a waypoint is not possible; empty if it can.
         """
         self.queue = WaypointQueue()
         self.command: LiveCommand | None = None
@@ -61,7 +61,7 @@ class Navigator:
         self._datum = datum
         self._clearance = clearance
         self._command_timeout = command_timeout
-        self._payload_objection = objection
+        self._action_objection = objection
         self._resume_after = round(resume_after * NANOSECONDS)
         self._unplanned: set[int] = set()
         self._unanswered: PlanRequest | None = None
@@ -107,7 +107,7 @@ class Navigator:
         known = self.queue.find(waypoint.id)
         if known is not None and (not source or known.source != source):
             return "a waypoint of this id is already queued; use another id"
-        if objection := self._payload_objection(waypoint):
+        if objection := self._action_objection(waypoint):
             return objection
         if objection := self._fence.objection(waypoint.position):
             return objection

@@ -158,7 +158,7 @@ class VehicleController:
             obeyed=self.vehicle.capabilities.obeys,
             clearance=GroundClearance.of(environment, robot.limits, takeoff, sea_level),
             sea_level=sea_level,
-            payload=self.vehicle,
+            vehicle=self.vehicle,
         )
         self.loop = SetpointLoop(self.vehicle, self.mission)
         self.state: VehicleState = self.vehicle.read()

@@ -192,9 +192,7 @@ def fly(ends: Stepped, each: Callable[[Mission], None] = lambda _: None) -> Miss
         Waypoint("a", 3, 0, 2, actuate={"hatch": "open", "hook": "release"}),
         Waypoint("b", 3, 3, 2, hover_duration=2.5, actuate={"hatch": "closed"}),
     ]
-    return ends.mission(
-        stops, MissionConfig.model_validate({"actuator_timeout": 4.0}), ends.vehicle
-    ).fly(each)
+    return ends.mission(stops, MissionConfig.model_validate({"actuator_timeout": 4.0})).fly(each)
 
 
 def test_a_mission_drops_its_load(ends: Stepped) -> None:

@@ -75,7 +75,7 @@ def handed(
     limits = {**LIMITS, **settings.pop("limits", {})}
     options = AutopilotOptions(family=family)  # type: ignore[arg-type]
     with Stepped(monkeypatch, options, limits=limits, **settings) as ends:
-        yield Handed(ends, SQUARE if stops is None else stops, payload=ends.vehicle)
+        yield Handed(ends, SQUARE if stops is None else stops)
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -307,7 +307,7 @@ def test_a_simulated_camera_records_between_its_waypoints() -> None:
     camera = payload.photo_camera
     assert isinstance(camera, VideoCamera)
     start = vehicle.read().odometry.position
-    mission = Mission(robot, InlinePlanner(OrderedScheduler()), takeoff=start, payload=vehicle)
+    mission = Mission(robot, InlinePlanner(OrderedScheduler()), takeoff=start, vehicle=vehicle)
     loop = SetpointLoop(vehicle, mission)
     stops = [BEGIN, FINISH, Waypoint("west", 0, 0, 2, video=True)]
     mission.handle(AddNavigation(AeroNavigation(data=stops)), 0)

@@ -228,7 +228,7 @@ def test_a_lens_without_zoom_or_focus_is_told(ends: Stepped) -> None:
         with pytest.raises(VehicleError, match="focus of the camera cannot be set"):
             lens_of(ends).adjust(LensTarget(focus=3.0))
         stop = Waypoint("a", 3, 0, 2, zoom=30.0, focus=5.0, photo=True)
-        mission = ends.mission([stop], patience(4.0), ends.vehicle).fly()
+        mission = ends.mission([stop], patience(4.0)).fly()
         assert mission.status.photos == (0, 1)
         assert told(mission, "photo") == ["a: no picture: the focus of the camera cannot be set"]
         camera = lens_of(ends)

@@ -89,7 +89,7 @@ def test_a_video_is_begun_and_ended_at_waypoints(ends: Stepped) -> None:
 
     with ends:
         known(ends)
-        mission = ends.mission([BEGIN, FINISH], OPTIONS, ends.vehicle).fly(note)
+        mission = ends.mission([BEGIN, FINISH], OPTIONS).fly(note)
         assert list(mission.status.visited) == ["a", "b"]
         assert heard(ends) == [(START, *[0.0] * 7), (STOP, *[0.0] * 7)]
         assert payload(ends).recording is None
@@ -104,7 +104,7 @@ def test_a_silent_camera_is_told_and_its_status_counts_later(ends: Stepped) -> N
     with ends:
         camera = known(ends)
         ends.autopilot.components[CAMERA].stalls = True
-        mission = ends.mission([BEGIN], OPTIONS, ends.vehicle).fly()
+        mission = ends.mission([BEGIN], OPTIONS).fly()
         assert list(mission.status.visited) == ["a"]
         assert told(mission, "video")[0] == (
             "video not begun at a: the camera did not acknowledge it within 4 s"
@@ -126,7 +126,7 @@ def test_a_camera_without_video_is_told_at_once(ends: Stepped) -> None:
     with ends:
         payload(ends).flags = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
         find_payload(ends)
-        mission = ends.mission([BEGIN], OPTIONS, ends.vehicle).fly()
+        mission = ends.mission([BEGIN], OPTIONS).fly()
         assert list(mission.status.visited) == ["a"]
         assert told(mission, "video") == ["video not begun at a: the camera records no video"]
         assert heard(ends) == []
@@ -139,7 +139,7 @@ def test_a_video_is_ended_before_the_link_is_closed(
     caplog.set_level(logging.WARNING)
     with ends:
         known(ends)
-        mission = ends.mission([BEGIN], OPTIONS, ends.vehicle).fly()
+        mission = ends.mission([BEGIN], OPTIONS).fly()
         assert mission.finished
         assert payload(ends).recording is not None
     assert payload(ends).recording is None
@@ -161,7 +161,7 @@ def test_a_status_that_belies_the_beginning_is_told_once(ends: Stepped) -> None:
             if told(mission, "video") and not belied:
                 belied.append(ends.now)
 
-        mission = ends.mission(stops, OPTIONS, ends.vehicle).fly(note)
+        mission = ends.mission(stops, OPTIONS).fly(note)
         assert told(mission, "video") == [f"video begun at a, but {NOT}"]
         assert 2.0 <= belied[0] - acknowledged[0] < 5.0
         ends.watch(1.0)
