@@ -88,6 +88,7 @@ def test_half_a_metre_a_second_is_the_limit(tmp_path: Path, speed: float, *, fal
     assert state.odometry.position[0] < WALL - 0.15
     if not falls:
         assert state.odometry.position[0] == pytest.approx(WALL - 0.2, abs=0.01)
+        assert abs(state.odometry.velocity[0]) < 0.05
         assert flight.to((0.0, 0.0, 1.5), 10.0, speed=2.0).odometry.position[0] < 0.1
         assert flight.vehicle.read().faults == ()
 

@@ -91,6 +91,21 @@ def test_a_fall_that_the_vehicle_knows_of_is_no_takeover(lost: bool) -> None:  #
     assert [alert.kind for alert in one.mission.alerts][-1] == "motors_stopped"
 
 
+def test_a_collision_that_the_vehicle_tells_ends_the_mission() -> None:
+    """An alert tells it while the drone falls; the mission ends with the same words."""
+    one = flight(add(*square()))
+    one.run(12.0)
+    hit = "collision with building barn at (1.0, 2.0, 3.0) at 2.1 m/s"
+    one.vehicle.faults = (hit,)
+    one.run(0.5)
+    assert [(alert.kind, alert.text) for alert in one.mission.alerts] == [("collision", hit)]
+    state = replace(one.vehicle.read(), mode=VehicleMode.GROUNDED, armed=False)
+    one.vehicle.read = lambda: replace(state, ended=FlightEnd.FELL)  # type: ignore[method-assign]
+    one.turn()
+    one.expect(S.ABORTED)
+    assert one.status.reason == hit
+
+
 def test_a_vehicle_that_lands_by_itself_on_higher_ground_did_not_fall() -> None:
     """The driver's word decides, not the height; why it landed is told, and that once."""
     one = flight(add(Waypoint("far", 60, 0, 4.0)))
