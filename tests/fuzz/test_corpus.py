@@ -12,7 +12,17 @@ from tools.fuzz.target import CORPUS, load_target, target_names
 _SECONDS = float(os.environ.get("AERODAAS_FUZZ_SECONDS", "0.3"))
 
 
-@pytest.mark.parametrize("target", target_names())
+_SLOW = frozenset({"agents"})
+"""Targets with a whole service behind them."""
+
+
+@pytest.mark.parametrize(
+    "target",
+    [
+        pytest.param(name, marks=pytest.mark.slow) if name in _SLOW else name
+        for name in target_names()
+    ],
+)
 def test_seeds_corpus_and_a_short_run_are_taken(target: str) -> None:
     """Every input that is known, as it is, and as many mutations as there is time for."""
     result = fuzz(target, seconds=_SECONDS)

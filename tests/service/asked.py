@@ -9,12 +9,14 @@ import pytest
 from proposed import AGENT, OPERATOR, OTHER_AGENT, STRANGER, ProposedTo
 from starlette.testclient import TestClient
 
+from aerodaas.config.redaction import catalogue
 from aerodaas.environment.provider import exchange
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.protocol.schemas import TokenIn
 from aerodaas.service.access.accounts import Access, Accounts
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.app import build_app
+from aerodaas.service.fleet.fleet_view import FleetView
 from aerodaas.service.flights.orders import FlightOrder
 from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.limits import PROVIDER, RequestLimits
@@ -46,8 +48,13 @@ class AskedProvider(ProposedTo):
             None, action, row.id, f"{row.account}: {text}", accepted=True, required=False
         )
         admission = Admission(Access(self.store, audit), audit)
+        config, actuators = self.settings.config, self.settings.actuators
+        shown = catalogue(config).model_dump(mode="json", by_alias=True)
+        fleet = FleetView(
+            config, shown, actuators, self.registry, self.leases, self.missions, self.store
+        )
         routes = (
-            FleetRoutes(self.fleet, admission),
+            FleetRoutes(fleet, admission),
             MissionRoutes(self.missions, admission),
             SubmissionRoutes(self.missions, admission, audit),
             ProposalRoutes(self.missions.proposals, admission, audit),
