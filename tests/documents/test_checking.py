@@ -189,6 +189,16 @@ def test_deadlines_hold_for_the_way_as_planned(order: str, *, passes: bool) -> N
             assert check_document(document, config()).passed
 
 
+def test_an_order_that_is_searched_in_flight_alone_misses_no_deadline_here() -> None:
+    """The nearest waypoint first would be late; the search for the best order may not be."""
+    stops = [{"id": "near", "x": 4, "hover_duration": 30}, {"id": "far", "x": 30, "deadline": 15}]
+    for scheduler, passes in (("nearest_neighbor", False), ("optimal", True)):
+        document = mission(*stops, trajectory_scheduler={"name": scheduler})
+        free = document.navigation[0].model_copy(update={"ordered": False})
+        document = document.model_copy(update={"navigation": [free]})
+        assert check_document(document, config()).passed is passes
+
+
 @pytest.mark.parametrize("scheduler", ["ordered", "optimal"])
 def test_a_deadline_that_no_way_meets_is_found(scheduler: str) -> None:
     """Before the drone can be there at all."""
