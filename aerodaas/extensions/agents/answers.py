@@ -226,17 +226,17 @@ class RobotState(_Answer):
     @classmethod
     def all_of(cls, mission: MissionOut) -> list[RobotState]:
         """States of a mission's drones."""
-        told = mission.told
-        return [cls.of(name, one, told.get(name)) for name, one in mission.status.items()]
+        received = mission.told
+        return [cls.of(name, one, received.get(name)) for name, one in mission.status.items()]
 
     @classmethod
-    def of(cls, robot: str, status: RobotStatus, told: float | None) -> RobotState:
+    def of(cls, robot: str, status: RobotStatus, received: float | None) -> RobotState:
         """Convert a status.
 
         Args:
             robot: Id of the drone.
             status: Its newest status.
-            told: Unix seconds when that came; None after the flight.
+            received: Unix seconds when that came; None after the flight.
         """
         mission, vehicle, place = status.mission, status.vehicle, status.place
         odometry = None if vehicle is None or place is None else vehicle.odometry
@@ -244,7 +244,7 @@ class RobotState(_Answer):
         return cls(
             robot=robot,
             state=mission.state.value,
-            age_s=_age(told),
+            age_s=_age(received),
             place=_rounded(place),
             heading_compass_deg=None if odometry is None else _heading(odometry.yaw),
             speed=None if odometry is None else round(length(odometry.velocity), 2),
@@ -279,7 +279,7 @@ class MissionAnswer(_Answer):
     @classmethod
     def of(cls, mission: MissionOut, link: str) -> MissionAnswer:
         """Convert a mission; `link` is the page on which it is approved."""
-        asks = mission.phase is MissionPhase.AWAITING_APPROVAL
+        awaits = mission.phase is MissionPhase.AWAITING_APPROVAL
         proposal = mission.proposal if mission.phase is MissionPhase.QUEUED else None
         approval = None if proposal is None else proposal.approval
         return cls(
@@ -288,7 +288,7 @@ class MissionAnswer(_Answer):
             landed=mission.phase is MissionPhase.LANDED,
             over=mission.phase.over,
             reason=world(mission.reason),
-            link=link if asks else None,
+            link=link if awaits else None,
             approval_lapses_s=None if approval is None else round(approval.lapses - time.time()),
             robots=RobotState.all_of(mission),
             alerts=untrusted(mission.alerts),

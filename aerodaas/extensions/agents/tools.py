@@ -184,14 +184,14 @@ class AgentTools:
         first = mission = await self._mission(call, id)
         began = anyio.current_time()
         while True:
-            changed, told = _changes(first, mission), anyio.current_time() - began
-            if told >= seconds or _is_due(until, mission, changed):
+            changed, elapsed = _changes(first, mission), anyio.current_time() - began
+            if elapsed >= seconds or _is_due(until, mission, changed):
                 break
-            await call.report_progress(round(told, 1), seconds, mission.phase.value)
-            await anyio.sleep(min(_EVERY, seconds - told))
+            await call.report_progress(round(elapsed, 1), seconds, mission.phase.value)
+            await anyio.sleep(min(_EVERY, seconds - elapsed))
             mission = await self._mission(call, id)
         answer = self._answer(call, mission)
-        return WatchAnswer(changed=changed, seconds=round(told, 1), mission=answer)
+        return WatchAnswer(changed=changed, seconds=round(elapsed, 1), mission=answer)
 
     async def stop(
         self,
@@ -233,8 +233,8 @@ class AgentTools:
         Within what the approver allowed beforehand it is done; otherwise a person is asked again.
         The answer is the change's own mission: watch it until "decision".
         """
-        wanted = _checked(ChangeIn, {"robot": robot, "waypoints": waypoints, "why": why})
-        mission = await self._callers.ask(call, lambda client: client.change(id, wanted))
+        request = _checked(ChangeIn, {"robot": robot, "waypoints": waypoints, "why": why})
+        mission = await self._callers.ask(call, lambda client: client.change(id, request))
         return self._answer(call, mission)
 
     async def results(

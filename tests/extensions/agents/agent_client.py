@@ -89,12 +89,17 @@ class Service:
         self.missions: dict[str, MissionOut] = {}
         self.slow: threading.Event | None = None
         """What the fleet's answer waits for."""
+        self.waiting = 0
+        """How often the fleet was asked for while its answer waits."""
+        self._lock = threading.Lock()
         self.looks: list[Callable[[], object]] = []
         """What happens before the next looks at a mission, one each."""
 
     def fleet(self) -> FleetOut:
         """One drone that was heard of nine seconds ago."""
         if self.slow is not None:
+            with self._lock:
+                self.waiting += 1
             self.slow.wait(60)
         shown = fleet().model_dump(mode="json", by_alias=True)
         robot = RobotOut(

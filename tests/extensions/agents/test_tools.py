@@ -258,6 +258,7 @@ def test_stop_waits_for_no_other_call() -> None:
             await anyio.sleep(0.1)
             with anyio.move_on_after(10):
                 found = await client.call_tool("stop", {"id": "m1", "how": "land"})
+            assert service.waiting <= 8, "the service refuses too many requests at once"
             released.set()
         return found
 

@@ -6,6 +6,7 @@ Behind it is the real service with a simulated drone; whoever approves is a seco
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -151,6 +152,42 @@ def test_another_tenants_mission_does_not_exist(provider: Served) -> None:
                 assert refused.is_error, tool
 
     anyio.run(play)
+
+
+def test_many_calls_at_once_keep_nobody_from_stopping(provider: Served) -> None:
+    """More than an account may send requests at once: calls that wait are none."""
+    token = provider.user("scout-many", "many", scopes=["propose"])
+
+    async def play() -> None:
+        async with Client(_over_http(provider.url, token)) as client:
+            found = await _asked(client, "propose", document=DOCUMENT, why="")
+            id_, watched = found["proposal"], []
+
+            async def watch() -> None:
+                watched.append(await _asked(client, "watch", id=id_, until="over", seconds=60))
+
+            async with anyio.create_task_group() as group:
+                for _ in range(24):
+                    group.start_soon(watch)
+                await anyio.sleep(3)
+                assert (await _asked(client, "stop", id=id_, how="land"))["withdrawn"]
+            assert {one["mission"]["phase"] for one in watched} == {"cancelled"}
+
+    anyio.run(play)
+
+
+def test_a_service_that_is_there(provider: Served) -> None:
+    """The command's own way to it, with a token of the environment."""
+    token = provider.user("scout-there", "there", scopes=["propose"])
+    words = ["-m", "aerodaas", "agent", "--to", provider.url]
+    environment = {**os.environ, "AERODAAS_TOKEN": token}
+
+    async def play() -> Any:  # noqa: ANN401
+        parameters = StdioServerParameters(command=sys.executable, args=words, env=environment)
+        async with Client(stdio_client(parameters)) as client:
+            return await _asked(client, "fleet")
+
+    assert anyio.run(play)["name"]["text"] == "campus"
 
 
 def test_over_standard_input_and_output(tmp_path: Path) -> None:
