@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from proposed import AGENT, AREA, ENVELOPE, GOOD, OPERATOR, OTHER_AGENT, STRANGER, ProposedTo
 
+from aerodaas.config.extensions import extensions
 from aerodaas.messages.mission import MissionState
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.proposals import ApprovalIn, ChangeIn
@@ -230,3 +231,17 @@ def test_rehearsals_of_changes_count_as_any_others(
     with pytest.raises(RefusedError, match="within an hour"):
         provider.change(mission, (6, 6, 3))
     provider.store.close()
+
+
+@pytest.mark.skipif(
+    "actuators" not in extensions(), reason="no waypoint moves an actuator without the extension"
+)
+def test_a_change_moves_no_actuator_that_was_not_ticked(provider: ProposedTo) -> None:
+    """The flight has none, and no change brings it one."""
+    mission, flight = provider.flown()
+    moves = {"type": "move_actuator", "actuator": "hook", "position": "release"}
+    waypoint = {"id": "w", "x": 1.0, "y": 1.0, "z": 3.0, "waypoint_type": "local"}
+    content = {"robot": "one", "waypoints": [{**waypoint, "actions": [moves]}]}
+    with pytest.raises(RefusedError, match="one/hook") as refused:
+        provider.missions.proposals.change(AGENT, mission.id, ChangeIn.model_validate(content))
+    assert (refused.value.status, flight.asked) == (403, [])

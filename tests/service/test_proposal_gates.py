@@ -19,6 +19,8 @@ from aerodaas.service.access.principal import Principal
 from aerodaas.service.flights.orders import Outcome
 from aerodaas.service.store import Tenant
 
+pytestmark = pytest.mark.slow
+
 PLACES = [(5.0, 0.0), (9.0, 3.0)]
 WHO = st.sampled_from([AGENT, OTHER_AGENT, STRANGER, OPERATOR])
 
@@ -191,8 +193,8 @@ class Proposals(RuleBasedStateMachine):
 
 TestProposals = Proposals.TestCase
 TestProposals.settings = settings(
-    max_examples=12,
+    max_examples=30,
     stateful_step_count=25,
     deadline=None,
-    suppress_health_check=list(HealthCheck),
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )

@@ -11,8 +11,9 @@ from offered import PILOT
 from proposed import AGENT, GOOD, OPERATOR, OTHER_AGENT, STRANGER, ProposedTo
 from served import document
 
+from aerodaas.config.extensions import extensions
 from aerodaas.protocol.proposals import ApprovalIn, ProposalIn
-from aerodaas.protocol.schemas import MissionIn, MissionPhase, Role, VerdictOut
+from aerodaas.protocol.schemas import MissionIn, MissionOut, MissionPhase, Role, VerdictOut
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.orders import FlightOrder
 from aerodaas.service.store import Tenant
@@ -383,3 +384,56 @@ def test_the_difference_is_to_the_last_approved_one(provider: ProposedTo) -> Non
     assert first.id in told
     assert "waypoint 2 moves from (5, 5, 2)" in told
     assert "waypoint 1" not in told
+
+
+moving = pytest.mark.skipif(
+    "actuators" not in extensions(), reason="no waypoint moves an actuator without the extension"
+)
+HOOK = {"id": "w", "x": 5.0, "y": 0.0, "z": 2.0, "waypoint_type": "local"}
+MOVES = {"type": "move_actuator", "actuator": "hook", "position": "release"}
+
+
+@pytest.fixture
+def carrier(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ProposedTo]:
+    """A provider of drones with a hook and a second one, both of which the tenant may move."""
+    grippers = [{"id": name, "type": "gripper"} for name in ("hook", "spare")]
+    made = ProposedTo(
+        tmp_path,
+        monkeypatch,
+        drone={"actuators": grippers},
+        actuators={"farm": frozenset({"one/hook", "one/spare"})},
+    )
+    yield made
+    made.store.close()
+
+
+def delivery(provider: ProposedTo) -> MissionOut:
+    """A requested proposal that moves the hook."""
+    navigation = [{"robot": "one", "waypoints": [{**HOOK, "actions": [MOVES]}]}]
+    content = {"document": document("one", navigation=navigation)}
+    found = provider.missions.proposals.propose(AGENT, ProposalIn.model_validate(content))
+    provider.rehearse_again(found.id)
+    return provider.missions.proposals.request_approval(AGENT, found.id)
+
+
+@moving
+def test_an_actuator_that_was_not_ticked_is_not_approved(carrier: ProposedTo) -> None:
+    """The approver is told which, and nothing flies."""
+    requested = delivery(carrier)
+    assert requested.proposal is not None
+    assert requested.proposal.actuators == ["one/hook"]
+    for ticked in ((), ("one/spare",), ("two/hook",)):
+        with pytest.raises(RefusedError, match="one/hook") as refused:
+            carrier.approve(requested, actuators=ticked)
+        assert refused.value.status == 409
+    assert not carrier.is_flying(requested)
+
+
+@moving
+def test_a_flight_moves_what_was_ticked_alone(carrier: ProposedTo) -> None:
+    """Whatever its tenant may, and whatever the provider does not have is not granted by a tick."""
+    requested = delivery(carrier)
+    carrier.approve(requested, actuators=["one/hook", "one/parachute"])
+    assert carrier.is_flying(requested)
+    order = FlightOrder.read(carrier.started[-1].order)
+    assert (order.rehearsal, order.actuators) == (False, ["one/hook"])
