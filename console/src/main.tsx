@@ -22,7 +22,7 @@ import { ApprovalPage } from "./approval";
 import { Theme, ThemeButton, useTheme } from "./page";
 import { areasOf } from "./place";
 import { Recorded } from "./recorded";
-import { Select } from "./widgets";
+import { Select, useEvent } from "./widgets";
 import { wordsOf } from "./words";
 import type { AccountOut, FleetOut, MissionOut } from "./wire";
 
@@ -91,6 +91,11 @@ function App() {
     setBeside(null);
     writeFragment({ mission: id, t: null, beside: null });
   };
+  // A link that is opened in this tab changes the fragment alone.
+  useEvent("hashchange", () => {
+    const linked = readFragment("mission");
+    if (linked && linked !== chosen) choose(linked);
+  });
   const compare = (id: string) => {
     setBeside(id);
     writeFragment({ beside: id });

@@ -52,6 +52,7 @@ export function plannedWays(mission: MissionOut, fleet: FleetOut, robots: RobotC
     const config = robots.find((one) => one.id === robot);
     const parked = fleet.robots.find((one) => one.id === robot)?.position;
     const start: Spot = parked ?? config?.start ?? [0, 0, 0];
+    const change = mission.proposal?.change_of != null;
     const own = mission.proposal?.document.navigation.filter((one) => one.robot === robot) ?? [];
     const waypoints = own.flatMap((one) => one.waypoints);
     const stops = waypoints.map((one) => stopOf(one, start, home));
@@ -60,18 +61,19 @@ export function plannedWays(mission: MissionOut, fleet: FleetOut, robots: RobotC
     const ordered = urgent.size < 2 && own.every((one) => one.ordered && one.index === null);
     return {
       ...{ robot, tone: `r${number % 6}`, start, stops, ordered, stream },
-      legs: ordered && stream === null ? legsOf(start, stops, config?.limits.takeoff_height ?? 0) : [],
+      legs: ordered && stream === null ? legsOf(start, stops, change ? null : (config?.limits.takeoff_height ?? 0)) : [],
       track: mission.verdict?.tracks[robot] ?? [],
     };
   });
 }
 
-/** Take-off, the way along the waypoints, return and landing. */
-function legsOf(start: Spot, stops: Stop[], takeoff: number): Spot[] {
+/** Take-off, the way along the waypoints, return and landing; only the way for a drone in flight (null). */
+function legsOf(start: Spot, stops: Stop[], takeoff: number | null): Spot[] {
   const [east, north, up] = start;
   const flown = stops.map(({ point, up: height }): Spot => [...point, height ?? up]);
   const last = flown.at(-1);
   if (!last) return [];
+  if (takeoff === null) return [start, start, ...flown, last, last];
   const lowest = up + takeoff;
   return [start, [east, north, lowest], ...flown, [east, north, Math.max(last[2], lowest)], start];
 }

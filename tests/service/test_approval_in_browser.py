@@ -152,7 +152,10 @@ def test_what_has_changed_since_it_was_shown_is_not_approved(
         # The agent's own account decides nothing, and neither does a pilot's.
         pilot = provider.user("paul", "farm")
         for token in (agent, pilot):
-            other = opened(browser, provider, token, mission)
+            other = browser.open(f"{provider.url}/#token={token}")
+            other.until("document.querySelector('.missions')")
+            # A link in a tab that has the page already.
+            other.run(f"location.hash = 'mission={mission}'")
             other.until("document.querySelector('[data-testid=now]')")
             assert other.run("document.querySelector('.approve, .terms')") is None
             assert other.complaints() == []
