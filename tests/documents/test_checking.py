@@ -356,7 +356,7 @@ STOPS = st.fixed_dictionaries(
     },
 )
 VALUES = st.recursive(
-    st.none() | st.booleans() | st.floats(allow_nan=False) | st.text(max_size=5),
+    st.none() | st.booleans() | st.floats(-1e9, 1e9) | st.text("ab$/é", max_size=5),
     lambda inner: (
         st.lists(inner, max_size=3)
         | st.dictionaries(

@@ -87,7 +87,8 @@ class WaypointQueue:
                 negative.
         """
         arriving = list(waypoints)
-        self._check(arriving, index, source)
+        queued = {stop.id: stop for stop in self}
+        self._check(arriving, queued, index, source)
         offset: dict[int, int] = {}
         for waypoint in arriving:
             stop = QueuedWaypoint(
@@ -99,7 +100,7 @@ class WaypointQueue:
                 waypoint.hover_duration,
                 above_ground=above_ground.get(waypoint.id),
             )
-            known = self.find(waypoint.id)
+            known = queued.get(waypoint.id)
             if known is not None and known.waypoint.priority == waypoint.priority:
                 level = self._levels[waypoint.priority]
                 stop.under_way = known.under_way
@@ -118,13 +119,19 @@ class WaypointQueue:
                 self._withdraw(level[1:])
             self._levels[waypoint.priority] = level
 
-    def _check(self, arriving: list[Waypoint], index: int | None, source: str) -> None:
+    @staticmethod
+    def _check(
+        arriving: list[Waypoint],
+        queued: Mapping[str, QueuedWaypoint],
+        index: int | None,
+        source: str,
+    ) -> None:
         if index is not None and index < 0:
             message = f"an index counts from the next waypoint and is not negative, not {index}"
             raise InvalidWaypointError(message)
         seen: set[str] = set()
         for waypoint in arriving:
-            known = self.find(waypoint.id)
+            known = queued.get(waypoint.id)
             taken = known is not None and (not source or known.source != source)
             if taken or waypoint.id in seen:
                 message = f"a waypoint called {waypoint.id!r} is already queued; use another id"
