@@ -1,7 +1,7 @@
 """Fly the scripted answers to the 25 tasks of agents, and judge them; no model is needed.
 
 python benchmarks/agents.py
-python benchmarks/agents.py --only N3 --only X4
+python benchmarks/agents.py --only N3 --only M1
 """
 
 from __future__ import annotations
