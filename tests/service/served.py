@@ -22,7 +22,7 @@ from typing_extensions import Self
 
 START_SECONDS = 60.0
 FLIGHT_SECONDS = 240.0
-OVER = {"landed", "refused", "cancelled", "failed"}
+OVER = {"landed", "applied", "refused", "cancelled", "failed"}
 
 
 def free_port() -> int:
