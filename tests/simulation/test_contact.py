@@ -93,6 +93,17 @@ def test_half_a_metre_a_second_is_the_limit(tmp_path: Path, speed: float, *, fal
         assert flight.vehicle.read().faults == ()
 
 
+@pytest.mark.parametrize("offset", [0.0, 0.2, 0.4, 0.6, 0.8])
+def test_a_fast_drone_does_not_pass_through_a_thin_thing(tmp_path: Path, offset: float) -> None:
+    """A fence of 0.1 m, at 9 m/s."""
+    fence = {"kind": "fence", "id": "fence", "points": [[20, -9], [20, 9]], "height": 3.0}
+    fast = {"max_speed": 10, "cruise_speed": 10, "max_acceleration": 8, "max_range": 200}
+    flight = Flight(tmp_path, fence, start=(offset, 0.0, 0.0), limits=fast).hovering()
+    state = flight.to((60.0, 0.0, 1.5), 10.0, speed=9.0)
+    assert state.faults[0].startswith("collision with fence fence")
+    assert state.odometry.position[0] < 20.0
+
+
 def test_a_flight_past_things_is_as_in_an_empty_world(tmp_path: Path) -> None:
     """A metre beside and above the house, to the last digit."""
     states = []
