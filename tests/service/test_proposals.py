@@ -339,6 +339,15 @@ def test_an_agent_has_some_rehearsals_within_an_hour(
         },
         {"sensors": ["one/lidar"]},
         {
+            "analyses": [
+                {
+                    "id": "one/watch",
+                    "analysis": "MonitoringAnalytics",
+                    "triggers": [{"target": "one", "command": "resume_mission"}],
+                }
+            ]
+        },
+        {
             "navigation": [
                 {
                     "robot": "one",
@@ -349,7 +358,7 @@ def test_an_agent_has_some_rehearsals_within_an_hour(
             ]
         },
     ],
-    ids=["user's side", "property", "unknown", "long"],
+    ids=["user's side", "property", "unknown", "resumes", "long"],
 )
 def test_what_cannot_be_flown_here_alone_is_not_proposed(
     provider: ProposedTo, changes: dict[str, object]

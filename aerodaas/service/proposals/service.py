@@ -100,7 +100,7 @@ class ProposalService:
         """
         document = proposal.document
         require_room(self._settings.state)
-        _require_flyable_alone(document)
+        _require_for_agents(document)
         robots = self._orders.check(principal, document)
         if proposal.parent is not None:
             self._own(principal, proposal.parent)
@@ -536,11 +536,16 @@ class ProposalService:
         return [f"Compared with {before}:", *(told or ["nothing differs."])]
 
 
-def _require_flyable_alone(document: MissionDocument) -> None:
-    """Raise RefusedError for a document that is too long, or needs somebody at its user's side."""
+def _require_for_agents(document: MissionDocument) -> None:
+    """Raise RefusedError for a document that is too long, or asks for what no agent may have."""
     if sum(len(entry.waypoints) for entry in document.navigation) > _MOST_WAYPOINTS:
         raise RefusedError(
             422, f"a proposal has at most {_MOST_WAYPOINTS} waypoints: propose it in parts"
+        )
+    triggers = [one for entry in document.analyses for one in entry.triggers]
+    if any(one.command == "resume_mission" for one in triggers):
+        raise RefusedError(
+            422, "a proposal resumes no paused drone by a trigger, for a person may have paused it"
         )
     if here := document.here:
         raise RefusedError(
