@@ -14,7 +14,7 @@ def main() -> None:
     path = Path(sys.argv[1])
     if FlightOrder.read(FlightFolder(path).order).rehearsal:
         end_with_starter()
-        from aerodaas.flights.rehearsal import rehearse  # noqa: PLC0415 - loads the plots
+        from aerodaas.flights.rehearsal import rehearse  # noqa: PLC0415 - loads the simulator
 
         rehearse(path)
         return

@@ -12,14 +12,15 @@ from pathlib import Path
 
 import psutil
 
+from aerodaas.config.extras import has_extra
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.mission_document import read_mission
 from aerodaas.errors import AeroDaaSError
 from aerodaas.flights.process import FlightProcess
 from aerodaas.protocol.schemas import VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.orders import FlightOrder, Outcome
+from aerodaas.service.flights.orders import FlightOrder, OtherLease, Outcome
 from aerodaas.service.rehearsal.findings import judge, together
-from aerodaas.service.rehearsal.picture import draw
 
 __all__ = ["rehearse"]
 
@@ -67,17 +68,25 @@ def _fly(
     try:
         verdict = judge(folder.recording, flying.config, minutes=minutes, others=others)
         if not before or (not verdict.approved and all(one.approved for one in before)):
-            # The picture is for people; a flight is not refused for want of it.
-            with contextlib.suppress(AeroDaaSError):
-                draw(
-                    folder.recording, folder.picture, flying.config, minutes=minutes, others=others
-                )
+            _draw(folder, flying.config, minutes, others)
     except AeroDaaSError as error:
         text = f"the rehearsal could not be judged: {error}"
         verdict = VerdictOut(approved=False, reasons=[text], seeds=seeds)
     # The verdict and its picture are all that is kept of it.
     folder.recording.unlink(missing_ok=True)
     return outcome, verdict
+
+
+def _draw(
+    folder: FlightFolder, config: EnvironmentConfig, minutes: float, others: Sequence[OtherLease]
+) -> None:
+    """Draw the flight; the picture is for people, and no flight is refused for want of it."""
+    if not has_extra("plots"):
+        return
+    from aerodaas.service.rehearsal.picture import draw  # noqa: PLC0415 - an extra
+
+    with contextlib.suppress(AeroDaaSError):
+        draw(folder.recording, folder.picture, config, minutes=minutes, others=others)
 
 
 def _watch(folder: FlightFolder, order: FlightOrder) -> None:

@@ -204,13 +204,13 @@ def test_a_tenant_has_so_many_missions_that_are_not_over(
         assert served.submit("two").phase is MissionPhase.SUBMITTED
 
 
-def ordered(folder: Path) -> FlightFolder:
+def ordered(folder: Path, **changes: object) -> FlightFolder:
     """The folder of a flight that is ordered for drone `one`."""
     path = folder / "fleet.json"
     path.write_text(json.dumps(fleet(robot("one"))), encoding="utf-8")
     made = FlightFolder(folder / "f")
     made.make(
-        order_in(folder, ends=time.time() + 600, minutes=10),
+        order_in(folder, ends=time.time() + 600, minutes=10, **changes),
         json.dumps(document("one", (5.0, 0.0))),
     )
     return made
@@ -220,6 +220,28 @@ def fly(folder: FlightFolder) -> str:
     """Run the process of a flight to its end; returns what it said."""
     command = [sys.executable, "-m", "aerodaas.flights", str(folder.path)]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120).stderr
+
+
+_WITHOUT_PLOTS = """
+import os, sys
+sys.modules["matplotlib"] = None  # as an installation without the extra `plots` has it
+from pathlib import Path
+from aerodaas.flights.rehearsal import rehearse
+rehearse(Path(sys.argv[1]))
+os._exit(0)
+"""
+
+
+def test_a_rehearsal_needs_no_plots(tmp_path: Path) -> None:
+    """The extra `service` alone serves a fleet; only the picture is missing then."""
+    made = ordered(tmp_path, speed="max", rehearsal=True)
+    command = [sys.executable, "-c", _WITHOUT_PLOTS, str(made.path)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    outcome = made.outcome()
+    assert outcome is not None, ended.stderr
+    assert outcome.verdict is not None
+    assert outcome.verdict.approved, outcome.verdict.reasons
+    assert not made.picture.exists()
 
 
 def test_a_flight_that_is_cancelled_before_it_begins_is_not_launched(tmp_path: Path) -> None:
