@@ -13,6 +13,7 @@ from aerodaas.protocol.proposals import ClearanceOut
 from aerodaas.protocol.schemas import VerdictOut
 from aerodaas.recording.report.flight import Band, RecordedFlight, RobotFlight
 from aerodaas.service.flights.orders import OtherLease
+from aerodaas.service.rehearsal.clearance import clearances
 from aerodaas.service.rehearsal.findings import Finding, findings_of, together
 
 FENCE = {"polygon": [[-20, -20], [20, -20], [20, 20], [-20, 20]], "ceiling": 30}
@@ -162,6 +163,16 @@ def test_things_are_kept_away_from(distance: float, told: str) -> None:
         assert told in one.text
         assert "(10.0, 4.0), 2.0 m up, after 14.0 s, and 0.5 m are to be kept: fly" in one.text
         assert one.place == (10.0, 4.0)
+
+
+def test_a_drone_that_has_landed_beside_something_is_not_near_it() -> None:
+    """The distance counts in the air."""
+    flight = flown([(0.0, 5.0), (10.0, 5.0)])
+    truth = [(5.0, 9.0, 5.0, 3.0), (20.0, 13.7, 5.0, 0.0)]
+    flight.robots["drone"].truth = truth
+    world = {"simulation": {"world": "field"}}
+    (found,) = clearances(flight, validated({"robots": [{"id": "drone"}], **world}, "the field"))
+    assert (found.thing, found.time, found.place) == ("fence", 5.0, (9.0, 5.0, 3.0))
 
 
 def verdict(seed: int, *reasons: str, **fields: Any) -> VerdictOut:  # noqa: ANN401
