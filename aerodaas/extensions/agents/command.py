@@ -80,15 +80,19 @@ def _serve(client: ProviderClient) -> None:
 
 
 def _shown(page: str) -> bool:
-    """Whether a browser shows a page; one that writes to standard output would break the protocol.
+    """Whether a browser shows a page; standard input and output are the protocol's meanwhile.
 
     Args:
         page: Address of the page.
     """
-    kept = os.dup(1)
+    kept = os.dup(0), os.dup(1)
+    nothing = os.open(os.devnull, os.O_RDONLY)
     try:
+        os.dup2(nothing, 0)
         os.dup2(2, 1)
         return webbrowser.open(page)
     finally:
-        os.dup2(kept, 1)
-        os.close(kept)
+        for number, descriptor in enumerate(kept):
+            os.dup2(descriptor, number)
+            os.close(descriptor)
+        os.close(nothing)

@@ -194,11 +194,16 @@ def test_over_standard_input_and_output(tmp_path: Path) -> None:
     """One command serves, and the person's address stands in standard error; all ends with it."""
     file, log = tmp_path / "fleet.json", tmp_path / "log"
     file.write_text(json.dumps(CONTENT), encoding="utf-8")
-    words = ["-m", "aerodaas", "agent", "--env", str(file), "--no-browser", "--speed", "max"]
+    words = ["-m", "aerodaas", "agent", "--env", str(file), "--speed", "max"]
+    # A browser that reads and writes, as those in a terminal do.
+    browser = tmp_path / "browser"
+    browser.write_text("#!/bin/sh\necho noise\nhead -c 5\n", encoding="utf-8")
+    browser.chmod(0o700)
+    environment = {**os.environ, "BROWSER": str(browser)}
 
     async def play() -> dict[str, Any]:
         with log.open("w") as errors:
-            parameters = StdioServerParameters(command=sys.executable, args=words)
+            parameters = StdioServerParameters(command=sys.executable, args=words, env=environment)
             async with Client(stdio_client(parameters, errlog=errors)) as client:
                 url, token = re.findall(r"(http://\S+)/#token=(\S+)", log.read_text())[0]
                 return await flown(client, ProviderClient(url, token))
