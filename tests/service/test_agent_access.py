@@ -249,7 +249,8 @@ def test_a_token_of_an_agent_stays_one_without_the_scope(service: Service) -> No
     body = BODIES["POST", "/v1/proposals"]
     assert service.ask("agent", "POST", "/v1/proposals", body).status_code == 403
     attached = {"document": document("one"), "attach": "any"}
-    assert service.ask("agent", "POST", "/v1/missions", attached).status_code == 403
+    refused = service.ask("agent", "POST", "/v1/missions", attached)
+    assert (refused.status_code, "agent's account" in refused.json()["text"]) == (403, True)
     assert service.ask("agent", "GET", "/v1/missions").status_code == 200
 
 

@@ -58,6 +58,33 @@ def test_the_same_proposal_again_is_the_same(provider: ProposedTo) -> None:
     assert provider.propose((5, 0)).id != first.id
 
 
+def test_what_its_check_finds_is_not_rehearsed(provider: ProposedTo) -> None:
+    """The figure and the remedy are told at once."""
+    proposed = provider.propose((100, 0))
+    assert not provider.missions.proposals.check(AGENT, proposed.id).passed
+    with pytest.raises(RefusedError, match="fence") as refused:
+        provider.missions.proposals.rehearse(AGENT, proposed.id, 1)
+    assert refused.value.status == 409
+    assert provider.phase(proposed) is MissionPhase.PROPOSED
+
+
+def test_another_document_than_the_approved_one_does_not_take_off(provider: ProposedTo) -> None:
+    """However it has come into the mission's folder."""
+    requested, other = provider.requested(), provider.propose((9, 3))
+    provider.approve(requested)
+    assert other.proposal is not None
+    provider.missions._missions[requested.id].write(other.proposal.document)
+    assert not provider.is_flying(requested)
+    assert provider.phase(requested) is MissionPhase.PROPOSED
+
+
+def test_an_agent_that_looks_is_no_user_that_is_there(provider: ProposedTo) -> None:
+    """A silent user's drone comes home, whoever else watches it."""
+    mission = provider.submit("two")
+    assert provider.missions.flies(PILOT, mission.id)
+    assert not provider.missions.flies(AGENT, mission.id)
+
+
 def test_a_rehearsal_flies_as_many_seeds_as_were_asked_for(provider: ProposedTo) -> None:
     """From the present charge."""
     proposed = provider.propose()
