@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from aerodaas.analytics.follow.analytics import FollowAnalytics
+from aerodaas.analytics.follow.followers import PersonFollowAnalytics, VipFollowAnalytics
 from aerodaas.analytics.inspection.tower_inspection import TowerInspectionAnalytics
 from aerodaas.config.checked import checked, near
 from aerodaas.config.model import EnvironmentConfig, TaskConfig
@@ -22,8 +23,9 @@ from aerodaas.protocol.proposals import Finding
 
 __all__ = ["GraphCheck"]
 
-_NEAREST = 3.0
-"""Metres that a drone which follows people or cars keeps from them at least."""
+_NEAREST, _NEAREST_TO_CARS = 1.5, 3.0
+"""Metres that a drone which follows people, or cars, keeps from them at least. A follower comes
+up to half a metre nearer than it is set to, and a car brakes harder than a drone."""
 _HEIGHTS: Sequence[tuple[type, str]] = (
     (FollowAnalytics, "height"),
     (TowerInspectionAnalytics, "top"),
@@ -109,17 +111,20 @@ class GraphCheck:
             yield from self._properties(analysis, one)
 
     def _followed(self, entry: AnalysisEntry) -> Iterator[Finding]:
-        if not issubclass(self._kinds[entry.id], FollowAnalytics):
+        kind = self._kinds[entry.id]
+        if not issubclass(kind, FollowAnalytics):
             return
+        cars = not issubclass(kind, PersonFollowAnalytics | VipFollowAnalytics)
+        nearest = _NEAREST_TO_CARS if cars else _NEAREST
         distance = _argument(entry, "distance")
-        if distance < _NEAREST:
+        if distance < nearest:
             yield Finding(
                 check="follow_distance",
-                text=f"{entry.id} follows at {distance:g} m; people and cars are kept at "
-                f"{_NEAREST:g} m or more",
-                remedy=f"set its distance to {_NEAREST:g} or more",
+                text=f"{entry.id} follows at {distance:g} m, and {nearest:g} m are the least from "
+                f"{'cars' if cars else 'people'}",
+                remedy=f"set its distance to {nearest:g} or more",
                 measured=distance,
-                limit=_NEAREST,
+                limit=nearest,
                 unit="m",
             )
 

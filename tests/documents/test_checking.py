@@ -208,20 +208,22 @@ def test_a_deadline_that_no_way_meets_is_found(scheduler: str) -> None:
     assert found.measured == pytest.approx(1 + math.hypot(5, 1.5) / 4, abs=0.1)
 
 
-@pytest.mark.parametrize("name", ["PersonFollowAnalytics", "CarFollowAnalytics"])
-def test_people_and_cars_are_followed_from_three_metres_or_more(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "least"),
+    [("PersonFollowAnalytics", 1.5), ("VipFollowAnalytics", 1.5), ("CarFollowAnalytics", 3.0)],
+)
+def test_people_and_cars_are_followed_from_a_distance(name: str, least: float) -> None:
     """The distance as given; a mission that keeps it passes."""
     found = only(check_document(followed(analysis(name, distance=0.3, height=2)), config()))
-    assert (found.check, found.measured, found.limit) == ("follow_distance", 0.3, 3)
-    near = followed(analysis(name, distance=3, height=2))
-    report = check_document(near, config())
+    assert (found.check, found.measured, found.limit) == ("follow_distance", 0.3, least)
+    report = check_document(followed(analysis(name, distance=least, height=2)), config())
     assert report.passed
     assert report.forecasts[0].distance is None
 
 
 def test_the_distance_that_an_analysis_takes_by_itself_counts() -> None:
-    """A follower that is told no distance keeps two metres."""
-    found = only(check_document(followed(analysis("PersonFollowAnalytics")), config()))
+    """A follower of the base class, which keeps two metres, may follow a car."""
+    found = only(check_document(followed(analysis("FollowAnalytics")), config()))
     assert found.measured == pytest.approx(2)
 
 

@@ -10,7 +10,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.dataflow.mission_document import MissionDocument
+from aerodaas.documents import schema as documents
 from aerodaas.extensions.agents.frames import HEADING, WAYPOINT_TYPES
 
 __all__ = ["AsJson", "bounded", "document_schema", "untitled"]
@@ -38,7 +38,7 @@ class AsJson:
 
 def document_schema(fleet: EnvironmentConfig) -> dict[str, Any]:
     """Schema of a mission document as agents write it, for the drones of `fleet`."""
-    return bounded(MissionDocument.model_json_schema(), fleet)
+    return bounded(documents.document_schema(), fleet)
 
 
 def bounded(schema: Mapping[str, Any], fleet: EnvironmentConfig) -> dict[str, Any]:

@@ -62,7 +62,7 @@ _MOST_ORDERS = 50
 """Flights and rehearsals after which a provider is made anew: its folder would only grow."""
 _STOP_SECONDS = 10.0
 """Wall seconds within which a stop answers amid other calls, on a busy machine."""
-_INSIDE = re.compile(r"Traceback|File \"|site-packages|/work/|/home/|/tmp/|\.py\b|0x[0-9a-f]{6}")
+_INSIDE = re.compile(r"Traceback|File \"|site-packages|/home/|/tmp/|\.py\b|0x[0-9a-f]{6}")
 """What an answer never holds: a trace of the inside."""
 _CALLERS = (AGENT.account, OTHER_AGENT.account, STRANGER.account)
 _HANDLES = ("$last", "$first", "$flying", "nothing", "../../etc/passwd", "")
