@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +80,7 @@ class Service:
 
     app: FastAPI
     accounts: Accounts
+    store: Store
     client: TestClient
     tokens: dict[str, str]
 
@@ -113,7 +114,7 @@ def service(tmp_path: Path) -> Iterator[Service]:
         for name in ("agent", "pilot", "boss", "stranger"):
             tokens[name] = accounts.issue(TokenIn(account=name)).secret or ""
         app = provider.build_service(wanted, store)
-        yield Service(app, accounts, TestClient(app), tokens)
+        yield Service(app, accounts, store, TestClient(app), tokens)
 
 
 def routes(service: Service) -> Iterator[tuple[str, str]]:
@@ -252,6 +253,19 @@ def test_a_token_of_an_agent_stays_one_without_the_scope(service: Service) -> No
     refused = service.ask("agent", "POST", "/v1/missions", attached)
     assert (refused.status_code, "agent's account" in refused.json()["text"]) == (403, True)
     assert service.ask("agent", "GET", "/v1/missions").status_code == 200
+
+
+def test_an_issuers_role_makes_no_agent_an_operator(service: Service) -> None:
+    """Nor does a scope that its row has kept: the token opens what an agent's does."""
+    more = frozenset({*PROPOSES, Scope.FLY})
+    service.store.accounts.update("agent", lambda row: replace(row, role=Role.ADMIN, scopes=more))
+    assert service.ask("agent", "GET", "/v1/missions").status_code == 200
+    for method, path in (("GET", "/v1/audit"), ("GET", "/v1/accounts"), ("POST", "/v1/leases")):
+        body = BODIES.get((method, path))
+        assert service.ask("agent", method, path, body).status_code == 403
+    stranger = service.ask("stranger", "POST", "/v1/missions", BODIES["POST", "/v1/missions"])
+    found = service.ask("agent", "GET", f"/v1/missions/{stranger.json()['id']}")
+    assert found.status_code == 404
 
 
 def test_a_person_who_becomes_an_agent_keeps_no_right_to_fly(service: Service) -> None:

@@ -141,6 +141,15 @@ def test_a_drone_that_was_stopped_is_not_changed(provider: ProposedTo, state: Mi
     assert refused.value.status == 409
 
 
+def test_a_change_is_checked_again_from_where_the_drone_is_by_then(provider: ProposedTo) -> None:
+    """It has flown on while it waited for the approval, here to where it must not be."""
+    mission, flight = provider.flown(None)
+    found = provider.judged(provider.change(mission, (5, 5, 3)))
+    flight.is_at((100.0, 0.0, 2.0))
+    assert provider.approve(found).phase is MissionPhase.REFUSED
+    assert flight.asked == []
+
+
 def test_what_the_drone_refuses_is_not_applied(provider: ProposedTo) -> None:
     """The drone's own word counts."""
     mission, flight = provider.flown()
