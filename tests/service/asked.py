@@ -17,6 +17,7 @@ from aerodaas.service.access.accounts import Access, Accounts
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.app import build_app
 from aerodaas.service.fleet.fleet_view import FleetView
+from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.orders import FlightOrder
 from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.limits import PROVIDER, RequestLimits
@@ -42,6 +43,8 @@ class AskedProvider(ProposedTo):
         limits: RequestLimits = PROVIDER,
         **settings: Any,  # noqa: ANN401
     ) -> None:
+        self.flights: list[FlightOrder] = []
+        """Orders of the flights that began; rehearsals are none."""
         super().__init__(folder, monkeypatch, **settings)
         audit, accounts = Audit(self.store), Accounts(self.store)
         self.missions.proposals.audit = lambda action, row, text: audit.write(
@@ -72,11 +75,10 @@ class AskedProvider(ProposedTo):
         """Client of an account."""
         return self._clients[account]
 
-    @property
-    def flights(self) -> list[FlightOrder]:
-        """Orders of the flights that began; rehearsals are none."""
-        orders = [FlightOrder.read(folder.order) for folder in self.started]
-        return [order for order in orders if not order.rehearsal]
+    def _start(self, folder: FlightFolder, *, tied: bool, vehicles: bool) -> Any:  # noqa: ANN401
+        order = FlightOrder.read(folder.order)  # a rehearsal's is gone once there is another one
+        self.flights += [] if order.rehearsal else [order]
+        return super()._start(folder, tied=tied, vehicles=vehicles)
 
     def audited(self, account: str = AGENT.account) -> list[AuditEntry]:
         """Entries of the audit log about an account, the newest first."""
