@@ -433,7 +433,7 @@ def _place(waypoint: Waypoint) -> list[str]:
 
 
 def _further(waypoint: Waypoint) -> dict[str, Any]:
-    """What a waypoint has beside id and place, where it is not the default."""
+    """Fields of a waypoint beside id and place that are not the default."""
     return {
         one.name: getattr(waypoint, one.name)
         for one in fields(Waypoint)

@@ -126,7 +126,7 @@ class RouteCheck:
         )
 
     def _refusals(self, commands: Sequence[AddNavigation]) -> Iterator[Finding]:
-        """What the mission itself would refuse, and no other check has found."""
+        """Findings of the mission's own rehearsal that no other check has."""
         try:
             rehearse(self.robot, commands, self.config, self.scheduler)
         except AeroDaaSError as error:

@@ -30,7 +30,7 @@ _STILL = 0.3
 
 @dataclass(frozen=True, slots=True)
 class Collision:
-    """What a drone hit, where and how fast."""
+    """Collision of a drone: with what, where and how fast."""
 
     what: str
     """Kind and id of the object, or `the ground`."""

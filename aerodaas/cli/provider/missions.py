@@ -170,7 +170,7 @@ def approve(
 
 
 def _told_to_approver(mission: MissionOut) -> Iterator[str]:
-    """What an approver has to know of a mission, a line each; a stranger's words are marked."""
+    """Describe a mission to its approver, a line each; a stranger's words are marked."""
     yield f"{mission.id} of {mission.account} ({mission.tenant}): {', '.join(mission.robots)}"
     if (proposal := mission.proposal) is not None:
         yield from (f"  {line}" for line in (*proposal.summary, *proposal.records))

@@ -296,7 +296,7 @@ class MissionAnswer(_Answer):
 
 
 class WatchAnswer(_Answer):
-    """What has changed, and the mission as it is now."""
+    """Changes of a mission, and the mission as it is now."""
 
     changed: list[Change]
     """Empty: nothing that matters, within the time."""
@@ -313,7 +313,7 @@ class StoppedRobot(_Answer):
 
 
 class StopAnswer(_Answer):
-    """What was stopped: each drone's own answer, or a mission withdrawn before it flew."""
+    """Result of a stop: each drone's own answer, or a mission withdrawn before it flew."""
 
     mission: str
     withdrawn: bool

@@ -102,7 +102,7 @@ def _serve(environment: Path, speed: str, state: Path) -> None:
     state.mkdir(parents=True, exist_ok=True, mode=0o700)
     agent, person = _tokens(state)
 
-    def tell(text: str) -> None:
+    def announce(text: str) -> None:
         if found := _SERVING.match(text):
             client = ProviderClient(found[1], person)
             threading.Thread(target=_end_with_starter, args=(client,), daemon=True).start()
@@ -114,7 +114,7 @@ def _serve(environment: Path, speed: str, state: Path) -> None:
     factor, simulated_time = speed_option(speed)
     config = located(EnvironmentConfig.load(environment), environment.parent)
     pace = "max" if simulated_time else factor or 1.0
-    serve(ServiceSettings(environment, config, state.absolute(), speed=pace), port=0, tell=tell)
+    serve(ServiceSettings(environment, config, state.absolute(), speed=pace), port=0, tell=announce)
 
 
 def _tokens(state: Path) -> tuple[str, str]:

@@ -82,7 +82,7 @@ class AgentTools:
     async def catalogue(
         self, topic: Annotated[str, Field(max_length=100, description=", ".join(TOPICS))]
     ) -> Topic:
-        """What a mission may be made of: examples, analyses and their arguments, the schema."""
+        """List parts of a mission: examples, analyses and their arguments, the schema."""
         try:
             return await anyio.to_thread.run_sync(topic_of, topic, self._fleet)
         except ConfigError as error:
@@ -325,7 +325,7 @@ def _converted(document: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _changes(first: MissionOut, now: MissionOut) -> list[Change]:
-    """What differs between two looks at a mission, as far as it matters."""
+    """Changes between two states of a mission that matter to its watcher."""
     found: list[Change] = []
     if now.phase is not first.phase:
         found.append("phase")

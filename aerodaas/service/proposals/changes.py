@@ -77,7 +77,7 @@ class FlightChanges:
         return _from(document, place)
 
     def renewed(self, host: ActiveMission, document: MissionDocument) -> MissionDocument:
-        """The same change from where its robot is now; raises RefusedError as `document`."""
+        """Renew a change from where its robot is now; raises RefusedError as `document`."""
         entry = document.navigation[0]
         place, _ = self._present(host, entry.robot)
         bare = entry.model_copy(update={"waypoints": entry.waypoints[1:]})

@@ -38,7 +38,7 @@ _CHECK_PATIENCE = 10.0
 
 
 def record_of(active: ActiveMission) -> ProposalRecord:
-    """What is kept of a proposal."""
+    """Record of a proposal, as its row keeps it."""
     return ProposalRecord.model_validate(active.row.request["proposal"])
 
 

@@ -46,7 +46,7 @@ class _Record(BaseModel):
 
 
 class Conditions(_Record):
-    """What a rehearsal is good for: charge, wind and limits, at one moment."""
+    """Conditions for which a rehearsal is good: charge, wind and limits, at one moment."""
 
     at: float
     """Unix seconds."""
@@ -61,7 +61,7 @@ class Conditions(_Record):
 
 
 class ProposalRecord(_Record):
-    """What the database keeps of a proposal, beside its document and its verdict."""
+    """Record of a proposal in the database, beside its document and its verdict."""
 
     conditions: Conditions
     """Of its newest rehearsal; before the first, of the moment when it was proposed."""
@@ -130,7 +130,7 @@ def encloses(area: Sequence[tuple[float, float]]) -> bool:
 
 
 def envelope_violation(envelope: Envelope, places: Sequence[Place], minutes: float) -> str:
-    """What of a way lies outside an envelope; empty if nothing does.
+    """Reason for which a way lies outside an envelope; empty if it lies inside.
 
     Args:
         envelope: Bounds that were approved.

@@ -523,7 +523,7 @@ class ProposalService:
         return active
 
     def _difference(self, row: Mission, document: MissionDocument, parent: str | None) -> list[str]:
-        """What differs from the last approved mission of the same name, or from the parent."""
+        """Difference to the last approved mission of the same name, or to the parent."""
         newest = self._store.missions.newest(_MOST_COMPARED, row.tenant)
         approved = (
             one for one in newest if one.name == row.name and one.id != row.id and one.started

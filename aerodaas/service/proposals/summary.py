@@ -33,7 +33,7 @@ _OF_PEOPLE = frozenset(
 
 
 def records_of(document: MissionDocument, cameras: Collection[str]) -> list[str]:
-    """What a mission records of its surroundings and of people, a sentence each.
+    """Describe what a mission records of its surroundings and of people, a sentence each.
 
     Args:
         document: The mission document.
@@ -61,7 +61,7 @@ _HEIGHTS = {
 
 
 def summary_of(document: MissionDocument, minutes: float) -> list[str]:
-    """What would fly, in sentences made from the document.
+    """Describe what would fly, in sentences made from the document.
 
     Args:
         document: The mission document.
@@ -128,7 +128,7 @@ def _named(stream: str, analyses: Mapping[str, AnalysisEntry]) -> str:
 
 
 def difference(before: MissionDocument, after: MissionDocument) -> list[str]:
-    """What differs between two documents, a sentence each; empty if they fly the same.
+    """Describe the difference of two documents, a sentence each; empty if they fly the same.
 
     Args:
         before: The earlier one.
