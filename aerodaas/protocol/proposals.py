@@ -28,6 +28,7 @@ __all__ = [
     "Finding",
     "ProposalIn",
     "ProposalOut",
+    "RefusedCallIn",
     "RehearseIn",
     "RobotForecast",
 ]
@@ -203,6 +204,14 @@ class ProposalOut(_Answer):
     """Moment (Unix seconds) from which on its rehearsal is no longer good for an approval; None
     without one."""
     approval: ApprovalOut | None = None
+
+
+class RefusedCallIn(_Request):
+    """Call of an agent's tool that was refused before it reached the service, for the audit log."""
+
+    tool: Annotated[str, Field(max_length=64)]
+    text: Annotated[str, Field(max_length=1000)]
+    """The refusal."""
 
 
 class ChangeIn(_Request):

@@ -42,6 +42,7 @@ MAY = {
     ("POST", "/v1/proposals"),
     ("GET", "/v1/proposals/{mission}/check"),
     ("POST", "/v1/proposals/{mission}/rehearse"),
+    ("POST", "/v1/refused-calls"),
     ("POST", "/v1/proposals/{mission}/request"),
 }
 """Routes that agents may ask, by method and address; all others refuse them with 403."""

@@ -20,7 +20,14 @@ from aerodaas.errors import ConfigError, SourceError
 from aerodaas.messages.health import HealthReport
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
-from aerodaas.protocol.proposals import ApprovalIn, ChangeIn, CheckReport, ProposalIn, RehearseIn
+from aerodaas.protocol.proposals import (
+    ApprovalIn,
+    ChangeIn,
+    CheckReport,
+    ProposalIn,
+    RefusedCallIn,
+    RehearseIn,
+)
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     AccountIn,
@@ -246,6 +253,17 @@ class ProviderClient:
             change: The robot and its new waypoints.
         """
         return self._ask(MissionOut, "POST", f"/v1/missions/{_part(mission)}/changes", change)
+
+    def report_refused_call(self, tool: str, text: str) -> None:
+        """Have a call written into the audit log that an agent's tool has refused by its form.
+
+        Args:
+            tool: Name of the tool.
+            text: The refusal.
+        """
+        content = RefusedCallIn(tool=tool, text=text).model_dump_json().encode()
+        headers = {"Content-Type": "application/json"}
+        self._exchange.send("POST", "/v1/refused-calls", content, headers)
 
     def command(self, mission: str, command: CommandIn) -> Answer:
         """Give a robot of a flying mission a command.

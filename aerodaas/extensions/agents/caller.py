@@ -16,7 +16,7 @@ from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.errors import AeroDaaSError, SourceError
 from aerodaas.extensions.agents.text import plain
 
-__all__ = ["Call", "Caller", "Callers", "refusal"]
+__all__ = ["Call", "Caller", "Callers", "RefusedByServiceError", "refusal"]
 
 T = TypeVar("T")
 Call: TypeAlias = Context[Any, Any]
@@ -25,6 +25,10 @@ _REQUESTS = 8
 """Requests of one caller to the service at a time; further ones wait. It refuses twice as many."""
 _LONGEST = 1000
 """Characters of a refusal."""
+
+
+class RefusedByServiceError(ToolError):
+    """Refusal of the service, which has audited it."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ class Callers:
             What `question` returned.
 
         Raises:
-            ToolError: With the service's own figures and remedy; without its address.
+            RefusedByServiceError: With the service's own figures and remedy; without its address.
         """
         caller = self._caller(call)
         limiter = anyio.CapacityLimiter(_REQUESTS)
@@ -79,7 +83,7 @@ class Callers:
         try:
             return await anyio.to_thread.run_sync(question, caller.client, limiter=limiter)
         except AeroDaaSError as error:
-            raise ToolError(refusal(error, caller.client)) from None
+            raise RefusedByServiceError(refusal(error, caller.client)) from None
 
 
 def refusal(error: AeroDaaSError, client: ProviderClient) -> str:

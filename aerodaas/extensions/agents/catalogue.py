@@ -20,7 +20,7 @@ TOPICS = ("missions", "analyses", "analysis:NAME", "schedulers", "conditions", "
 _ANALYSIS = "analysis:"
 _CONDITIONS = (
     "A trigger of an analysis has `target`, `when` and, for a robot, `command`:",
-    "end_mission, pause_mission or resume_mission. Without `when` each result triggers.",
+    "end_mission or pause_mission. Without `when` each result triggers.",
     '{"$settings": "Near", "of": {"place": [57, 6], "metres": 3}}: near a place.',
     '{"$settings": "Below", "of": {"reading": "battery", "limit": 0.4}}, and "Above": of readings.',
     '{"$condition": "hand_raised"} and {"$condition": "fallen"}: of a person\'s pose.',

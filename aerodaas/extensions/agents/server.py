@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import logging
 import tempfile
@@ -20,7 +21,7 @@ from aerodaas.config.checked import near
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.extensions.agents.answers import ResultsAnswer
-from aerodaas.extensions.agents.caller import Call, Caller, Callers
+from aerodaas.extensions.agents.caller import Call, Caller, Callers, RefusedByServiceError
 from aerodaas.extensions.agents.prompts import PROMPTS
 from aerodaas.extensions.agents.schema import bounded, document_schema, untitled
 from aerodaas.extensions.agents.text import plain
@@ -106,9 +107,29 @@ class AgentServer(MCPServer[Any]):
     ) -> CallToolResult | InputRequiredResult:
         """Call a tool; what its arguments lack is told by field, without their values.
 
+        A refusal that the service does not know of goes into its audit log.
+
         Raises:
             ToolError: For an unknown tool or field, and for what the tool refuses.
         """
+        try:
+            return await self._call_known(name, arguments, context)
+        except UnexpectedToolError:
+            raise
+        except ToolError as error:
+            if context is not None and not isinstance(error.__cause__, RefusedByServiceError):
+                tool, text = _short(name), plain(str(error), _LONGEST)
+                # The refusal holds also while the service cannot be told.
+                with contextlib.suppress(ToolError):
+                    await self._callers.ask(
+                        context, lambda client: client.report_refused_call(tool, text)
+                    )
+            raise
+
+    async def _call_known(
+        self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None
+    ) -> CallToolResult | InputRequiredResult:
+        """Call a tool by its name and arguments; raises ToolError for others than it has."""
         known = {tool.name: tool.input_schema["properties"] for tool in await super().list_tools()}
         if name not in known:
             name = _short(name)

@@ -6,12 +6,19 @@ from typing import Any
 
 from fastapi import APIRouter, Request
 
-from aerodaas.protocol.proposals import ChangeIn, CheckReport, ProposalIn, RehearseIn
+from aerodaas.protocol.proposals import (
+    ChangeIn,
+    CheckReport,
+    ProposalIn,
+    RefusedCallIn,
+    RehearseIn,
+)
 from aerodaas.protocol.schemas import MissionOut, Role, Scope
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
+from aerodaas.service.proposals.record import plain_text
 from aerodaas.service.proposals.service import ProposalService
 
 __all__ = ["ProposalRoutes"]
@@ -35,6 +42,7 @@ class ProposalRoutes:
         router.add_api_route("/proposals/{mission}/rehearse", self.rehearse, **posted)
         router.add_api_route("/proposals/{mission}/request", self.request, **posted)
         router.add_api_route("/missions/{mission}/changes", self.change, **posted)
+        router.add_api_route("/refused-calls", self.refused_call, methods=["POST"], status_code=204)
         return router
 
     def propose(self, body: ProposalIn, request: Request) -> MissionOut:
@@ -76,6 +84,12 @@ class ProposalRoutes:
         with self._admission.auditing(principal, request):
             found = self._proposals.request_approval(principal, mission)
         return self._audited(principal, "proposal.request", found)
+
+    def refused_call(self, body: RefusedCallIn, request: Request) -> None:
+        """Write a call into the audit log that an agent's tool has refused by its form."""
+        principal = self._require(request)
+        tool, text = plain_text(body.tool), plain_text(body.text)
+        self._audit.write(principal, "tool.refused", tool, text, accepted=False)
 
     def _require(self, request: Request) -> Principal:
         return self._admission.require(request, Role.PILOT, Scope.PROPOSE, agents=True)

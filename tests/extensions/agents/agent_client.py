@@ -85,6 +85,7 @@ class Service:
         self.proposed: list[ProposalIn] = []
         self.commands: list[tuple[str, str]] = []
         self.changes: list[ChangeIn] = []
+        self.refused_calls: list[tuple[str, str]] = []
         self.refusal: Exception | None = None
         self.missions: dict[str, MissionOut] = {}
         self.slow: threading.Event | None = None
@@ -152,6 +153,10 @@ class Service:
     def cancel(self, mission: str) -> MissionOut:
         """Withdraw it."""
         return self.change_mission(mission, phase=MissionPhase.CANCELLED)
+
+    def report_refused_call(self, tool: str, text: str) -> None:
+        """Keep it."""
+        self.refused_calls.append((tool, text))
 
     def command(self, mission: str, command: CommandIn) -> Answer:
         """Obey, if there is such a drone."""

@@ -170,6 +170,9 @@ def test_no_tool_does_it(agent: Agent, tool: str, arguments: dict[str, Any], nam
     text = agent.refused(tool.partition(" ")[2], **arguments)
     assert named in text
     assert "Traceback" not in text
+    audited = agent.provider.audited()[0]
+    assert (audited.action, audited.accepted) == ("tool.refused", False)
+    assert named in f"{audited.target} {audited.text}"
     assert not agent.provider.started
     assert isinstance(agent.propose(NEAR), dict)
 
