@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from aerodaas.messages.vehicle import COLLISION
 from aerodaas.simulation.collision import BODY, Nearest, Obstacles
 from aerodaas.simulation.dynamics import STEP, Multirotor, Triple
 
@@ -42,9 +41,9 @@ class Collision:
     def __str__(self) -> str:
         """Return the fault in words."""
         x, y, z = self.place
-        return (
-            f"{COLLISION} with {self.what} at ({x:.1f}, {y:.1f}, {z:.1f}) at {self.speed:.1f} m/s"
-        )
+        where = f"({x:.1f}, {y:.1f}, {z:.1f})"
+        # It begins with `messages.vehicle.COLLISION`, by which the mission knows it.
+        return f"collision with {self.what} at {where} at {self.speed:.1f} m/s"
 
 
 class Contacts:

@@ -38,7 +38,7 @@ def agent(
         bool, typer.Option(help="Open the page on which a person approves missions.")
     ] = True,
 ) -> None:
-    """Let an agent propose missions: the Model Context Protocol over standard input and output.
+    """Let an agent propose missions (MCP over standard input and output).
 
     The agent's program starts it. A mission flies once it was rehearsed, and a person has approved
     it on the page whose address is printed to standard error.
