@@ -2,13 +2,21 @@
 
 python benchmarks/agents.py
 python benchmarks/agents.py --only N3 --only M1
+
+With a model, by hand: give it each request, keep the documents that it proposes as N1-1.json,
+N1-2.json, … in a folder, and have them flown and judged:
+
+python benchmarks/agents.py --requests
+python benchmarks/agents.py --answers folder
 """
 
 from __future__ import annotations
 
 import json as json_format
+import math
 import tempfile
 import time
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
@@ -22,9 +30,13 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from aerodaas.errors import UnknownIdError
+from aerodaas.dataflow.mission_document import read_mission
+from aerodaas.errors import AeroDaaSError, UnknownIdError
 
-__all__ = ["Result", "judge"]
+__all__ = ["Answer", "Result", "judge", "judge_answers", "pass_interval"]
+
+_CONFIDENT = 1.96
+"""Standard deviations of a normal distribution within which 95 % lie."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +81,63 @@ def judge(task: Task, folder: Path) -> Result:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A document that somebody proposed for a task, flown and judged."""
+
+    file: str
+    failed: tuple[str, ...]
+    """Checks that it fails, or why it cannot be flown; none for one that passes."""
+
+
+def judge_answers(files: Sequence[Path], folder: Path) -> Iterator[Answer]:
+    """Fly and judge documents; the part of a file's name before the first `-` is its task.
+
+    Args:
+        files: Mission documents.
+        folder: Where recordings go, in a folder each.
+
+    Raises:
+        UnknownIdError: For a file of no task, before any flies.
+    """
+    for file in files:
+        if _task_of(file) not in TASKS:
+            raise UnknownIdError("task", _task_of(file), list(TASKS))
+    for file in files:
+        task, place = TASKS[_task_of(file)], folder / file.stem
+        place.mkdir(parents=True)
+        try:
+            evidence = fly(read_mission(file), task.environment, place, changes=task.changes)
+        except AeroDaaSError as error:
+            yield Answer(file.name, (str(error),))
+            continue
+        checks = [criterion(evidence) for criterion in task.criteria]
+        failed = [check for check in checks if not check.holds]
+        yield Answer(file.name, tuple(f"{check.what}: {check.found}" for check in failed))
+
+
+def _task_of(file: Path) -> str:
+    return file.stem.partition("-")[0]
+
+
+def pass_interval(passed: int, tried: int) -> tuple[float, float]:
+    """Wilson's interval of a rate of success, at 95 % confidence.
+
+    E. B. Wilson, "Probable inference, the law of succession, and statistical inference", 1927.
+
+    Args:
+        passed: Successes.
+        tried: Trials, at least 1.
+
+    Returns:
+        The least and the greatest rate, 0 to 1.
+    """
+    rate, square = passed / tried, _CONFIDENT**2 / tried
+    middle = rate + square / 2
+    spread = _CONFIDENT * math.sqrt((rate * (1 - rate) + square / 4) / tried)
+    return max(0.0, (middle - spread) / (1 + square)), min(1.0, (middle + spread) / (1 + square))
+
+
 def _is_of_the_mistake(task: Task, failures: tuple[Check, ...]) -> bool:
     """Whether each failed check is one that the mistake names, and each named one has failed."""
     told = [check.what for check in failures]
@@ -82,8 +151,19 @@ def main(
     quick: Annotated[bool, typer.Option(help="Leave out what runs neural networks.")] = False,  # noqa: FBT002
     keep: Annotated[Path | None, typer.Option(help="Keep recordings in this new folder.")] = None,
     json: Annotated[Path | None, typer.Option(help="Write the results to this file.")] = None,
+    requests: Annotated[bool, typer.Option(help="Print the requests, and fly nothing.")] = False,  # noqa: FBT002
+    answers: Annotated[
+        Path | None, typer.Option(help="Judge a model's documents in this folder: N1-1.json, …")
+    ] = None,
 ) -> None:
     """Fly, judge and print; ends with status 1 where one differs from what is expected."""
+    if requests:
+        for task in TASKS.values():
+            typer.echo(f"{task.name} ({task.environment}): {task.request}")
+        return
+    if answers is not None:
+        _judge_model(answers, keep)
+        return
     for name in only or []:
         if name not in TASKS:
             typer.echo(f"error: {UnknownIdError('task', name, list(TASKS))}", err=True)
@@ -99,6 +179,31 @@ def main(
         content = {"machine": machine_line(), "tasks": [asdict(result) for result in results]}
         json.write_text(json_format.dumps(content, indent=2) + "\n")
     raise typer.Exit(0 if all(result.as_expected for result in results) else 1)
+
+
+def _judge_model(answers: Path, keep: Path | None) -> None:
+    """Judge the documents of a folder, and print the rate of those that pass."""
+    files = sorted(answers.glob("*.json"))
+    if not files:
+        typer.echo(f"error: {answers} holds no document such as N1-1.json", err=True)
+        raise typer.Exit(2)
+    console = Console(width=max(140, Console().width), highlight=False)
+    with tempfile.TemporaryDirectory(prefix="agents-") as temporary:
+        try:
+            flown = judge_answers(files, keep or Path(temporary))
+            judged = list(track(flown, "flying", total=len(files), console=console))
+        except UnknownIdError as error:
+            typer.echo(f"error: {error}", err=True)
+            raise typer.Exit(2) from None
+    table = Table(title="a model's answers to the tasks of agents", caption=machine_line())
+    for column in ("document", "", "fails at"):
+        table.add_column(column)
+    for answer in judged:
+        table.add_row(answer.file, "" if answer.failed else "passes", "\n".join(answer.failed))
+    console.print(table)
+    passed = sum(not answer.failed for answer in judged)
+    low, high = pass_interval(passed, len(judged))
+    console.print(f"{passed} of {len(judged)} pass; 95 % interval {low:.0%} to {high:.0%}")
 
 
 def _show(console: Console, results: list[Result]) -> None:

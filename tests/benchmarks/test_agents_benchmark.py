@@ -20,10 +20,11 @@ from agent_tasks.criteria import (  # noqa: E402 - benchmarks are no package
     stays,
 )
 from agent_tasks.tasks import TASKS  # noqa: E402
-from agents import judge  # noqa: E402
+from agents import judge, judge_answers, pass_interval  # noqa: E402
 from missions.evidence import Evidence  # noqa: E402
 
 from aerodaas.config.model import GeofenceConfig, LimitsConfig, RobotConfig  # noqa: E402
+from aerodaas.errors import UnknownIdError  # noqa: E402
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight  # noqa: E402
 from aerodaas.simulation.scenario import Scenario  # noqa: E402
 from aerodaas.simulation.world import World  # noqa: E402
@@ -42,6 +43,29 @@ def test_a_solution_passes_and_a_near_miss_fails(name: str, tmp_path: Path) -> N
     assert not result.solution
     assert result.miss
     assert result.as_expected, result.miss
+
+
+def test_a_models_answers_are_judged_like_the_scripted_ones(tmp_path: Path) -> None:
+    """One passes, one fails at the corners that it mirrors, and one cannot be flown."""
+    answers = tmp_path / "answers"
+    answers.mkdir()
+    task = TASKS["N1"]
+    (answers / "N1-a.json").write_text(task.solution().text())
+    (answers / "N1-b.json").write_text(task.miss().text())
+    (answers / "N1-c.json").write_text("{}")
+    judged = list(judge_answers(sorted(answers.iterdir()), tmp_path / "flown"))
+    assert [bool(answer.failed) for answer in judged] == [False, True, True]
+    with pytest.raises(UnknownIdError):
+        list(judge_answers([tmp_path / "N99-a.json"], tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("passed", "tried", "low", "high"),
+    [(0, 10, 0.0, 0.278), (10, 10, 0.722, 1.0), (20, 25, 0.609, 0.911)],
+)
+def test_an_interval_is_wilsons(passed: int, tried: int, low: float, high: float) -> None:
+    """Values of published tables."""
+    assert pass_interval(passed, tried) == pytest.approx((low, high), abs=0.001)
 
 
 def test_each_task_is_asked_and_judged() -> None:
