@@ -16,6 +16,7 @@ import json
 import operator
 import re
 import textwrap
+import threading
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -47,6 +48,9 @@ __all__ = [
     "class_texts",
     "condition_adapter",
 ]
+
+_parsing = threading.Lock()
+"""Held while source is parsed: CPython 3.11 raises SystemError where two threads parse at once."""
 
 SETTINGS = {
     "Above": "aerodaas.analytics.conditions:Above",
@@ -295,7 +299,8 @@ def _settings_value(name: str) -> type[BaseModel]:
 
 def class_texts(kind: type) -> dict[str, str]:
     """Docstrings of a class' attributes, by name, each on one line."""
-    node = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
+    with _parsing:
+        node = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
     texts = attribute_texts(node) if isinstance(node, ast.ClassDef) else {}
     return {name: " ".join(text.split()) for name, text in texts.items()}
 
