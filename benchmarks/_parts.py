@@ -57,7 +57,7 @@ class _Flight:
             takeoff=self._vehicle.read().odometry.position,
             origin=origin,
             wind=np.array(config.simulation.wind),
-            payload=self._vehicle,
+            vehicle=self._vehicle,
         )
         self._loop = SetpointLoop(self._vehicle, self._mission)
         stops = [

@@ -109,7 +109,7 @@ def _flown(
     """Places between the first waypoint and the last, ENU metres, and the seconds between them."""
     clock = ScaledClock()
     takeoff = vehicle.read().odometry.position
-    mission = Mission(robot, InlinePlanner(OrderedScheduler()), takeoff=takeoff, payload=vehicle)
+    mission = Mission(robot, InlinePlanner(OrderedScheduler()), takeoff=takeoff, vehicle=vehicle)
     loop = SetpointLoop(vehicle, mission)
     vehicle.use_clock(clock)
     order = AeroNavigation(NavigationType.DISTANCE_DRIVEN, stops, SchedulingType.ORDERED)
