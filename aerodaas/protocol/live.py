@@ -12,7 +12,8 @@ from pydantic import Field
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.frames import Header
 from aerodaas.messages.waypoints import FollowedTarget
-from aerodaas.protocol.schemas import AnswerModel, MissionOut
+from aerodaas.protocol.base import AnswerModel
+from aerodaas.protocol.schemas import MissionOut
 
 __all__ = [
     "DepthItem",

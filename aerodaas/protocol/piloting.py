@@ -17,7 +17,8 @@ from aerodaas.mission.commands import (
     Steer,
     TakeControls,
 )
-from aerodaas.protocol.schemas import AnswerModel, RequestModel, Word
+from aerodaas.protocol.base import AnswerModel, RequestModel
+from aerodaas.protocol.schemas import Word
 
 __all__ = [
     "ActuateIn",

@@ -13,8 +13,9 @@ from pydantic import Field
 from aerodaas.messages.mission import MissionPlan, MissionStatus
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import VehicleState
+from aerodaas.protocol.base import AnswerModel
 from aerodaas.protocol.scenery import SceneryOut
-from aerodaas.protocol.schemas import AnalyticsOut, AnswerModel, StreamKind
+from aerodaas.protocol.schemas import AnalyticsOut, StreamKind
 
 __all__ = ["PlaybackOut", "RecordedOut", "TrackOut"]
 

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, FailFast, Field
+from pydantic import FailFast, Field
 
 from aerodaas.dataflow.mission_document import DocumentWaypoint, MissionDocument
 from aerodaas.identifiers import Word
-from aerodaas.messages.waypoints import LARGEST
+from aerodaas.protocol.base import AnswerModel, Area, Minutes, Number, Positive, RequestModel
 
 __all__ = [
     "ApprovalIn",
@@ -33,27 +33,15 @@ __all__ = [
     "RobotForecast",
 ]
 
-_Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
-_Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
-_Area = Annotated[list[tuple[_Number, _Number]], Field(min_length=3, max_length=100)]
-_MOST_MINUTES = 24 * 60
 _MOST_SEEDS = 5
 _LONGEST_REASON = 500
 
 
-class _Request(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class _Answer(BaseModel):
-    model_config = ConfigDict(frozen=True, from_attributes=True)
-
-
-class ProposalIn(_Request):
+class ProposalIn(RequestModel):
     """A mission that is kept and checked; nothing flies by it."""
 
     document: MissionDocument
-    minutes: Annotated[float, Field(gt=0, le=_MOST_MINUTES)] = 15.0
+    minutes: Minutes = 15.0
     """Of the lease that is requested with it."""
     parent: str | None = None
     """Id of the proposal that it changes; None for a new one."""
@@ -61,7 +49,7 @@ class ProposalIn(_Request):
     """Reason in the proposer's words, shown to the approver as text that nobody has checked."""
 
 
-class RehearseIn(_Request):
+class RehearseIn(RequestModel):
     """Request of a rehearsal in simulation."""
 
     seeds: Annotated[int, Field(ge=1, le=_MOST_SEEDS)] = 3
@@ -87,7 +75,7 @@ CheckName: TypeAlias = Literal[
 """Check of a document without flying, by the limit that it looks at."""
 
 
-class Finding(_Answer):
+class Finding(AnswerModel):
     """One reason against a mission document."""
 
     check: CheckName
@@ -105,7 +93,7 @@ class Finding(_Answer):
     """`m`, `s`, `m/s` or `%`."""
 
 
-class RobotForecast(_Answer):
+class RobotForecast(AnswerModel):
     """Way of one robot, as planned from its present place and charge."""
 
     robot: str
@@ -120,7 +108,7 @@ class RobotForecast(_Answer):
     """Metres above home of the highest waypoint."""
 
 
-class CheckReport(_Answer):
+class CheckReport(AnswerModel):
     """Result of `aerodaas.documents.checking.check_document`: checks without flying."""
 
     passed: bool
@@ -128,7 +116,7 @@ class CheckReport(_Answer):
     forecasts: list[RobotForecast] = Field(default_factory=list)
 
 
-class ClearanceOut(_Answer):
+class ClearanceOut(AnswerModel):
     """Smallest distance of a rehearsed flight from an object of the simulated world."""
 
     distance: float
@@ -143,20 +131,20 @@ class ClearanceOut(_Answer):
     """Mission time, seconds."""
 
 
-class Envelope(_Request):
+class Envelope(RequestModel):
     """Bounds within which an approved mission may be changed in flight without a new approval."""
 
-    area: _Area
+    area: Area
     """Corners (east, north)."""
-    floor: _Number = 0.0
+    floor: Number = 0.0
     """Lowest height above home."""
-    ceiling: _Positive
+    ceiling: Positive
     """Greatest height above home."""
-    minutes: Annotated[float, Field(gt=0, le=_MOST_MINUTES)]
+    minutes: Minutes
     """From the take-off on."""
 
 
-class ApprovalIn(_Request):
+class ApprovalIn(RequestModel):
     """Approval of exactly one proposal."""
 
     hash: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
@@ -167,7 +155,7 @@ class ApprovalIn(_Request):
     """Actuators that the mission may move, as `robot/actuator`."""
 
 
-class ApprovalOut(_Answer):
+class ApprovalOut(AnswerModel):
     """Approval of a proposal."""
 
     account: str
@@ -180,7 +168,7 @@ class ApprovalOut(_Answer):
     actuators: list[str] = Field(default_factory=list)
 
 
-class ProposalOut(_Answer):
+class ProposalOut(AnswerModel):
     """A proposed mission: what an approver is shown."""
 
     hash: str
@@ -206,7 +194,7 @@ class ProposalOut(_Answer):
     approval: ApprovalOut | None = None
 
 
-class RefusedCallIn(_Request):
+class RefusedCallIn(RequestModel):
     """Call of an agent's tool that was refused before it reached the service, for the audit log."""
 
     tool: Annotated[str, Field(max_length=64)]
@@ -214,7 +202,7 @@ class RefusedCallIn(_Request):
     """The refusal."""
 
 
-class ChangeIn(_Request):
+class ChangeIn(RequestModel):
     """Waypoints that replace those of a robot in flight, and the reason."""
 
     robot: Word

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.sections.robot import RobotConfig
-from aerodaas.protocol.schemas import AnswerModel
+from aerodaas.protocol.base import AnswerModel
 from aerodaas.simulation.ground_plan import Shape, ground_plan
 from aerodaas.simulation.world import World
 

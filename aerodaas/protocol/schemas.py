@@ -10,14 +10,14 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, FailFast, Field, field_validator
+from pydantic import AfterValidator, ConfigDict, FailFast, Field, field_validator
 
 from aerodaas.dataflow.mission_document import DocumentWaypoint, MissionDocument
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.identifiers import ScopedWord, Word
 from aerodaas.messages.health import Verdict
 from aerodaas.messages.mission import Place, RobotStatus
-from aerodaas.messages.waypoints import LARGEST, NavigationType, SchedulingType
+from aerodaas.messages.waypoints import NavigationType, SchedulingType
 from aerodaas.mission.commands import (
     AddNavigation,
     ClearNavigation,
@@ -27,6 +27,7 @@ from aerodaas.mission.commands import (
     Resume,
     ReturnHome,
 )
+from aerodaas.protocol.base import AnswerModel, Area, Minutes, Number, Positive, RequestModel
 from aerodaas.protocol.proposals import ClearanceOut, ProposalOut
 
 __all__ = [
@@ -35,8 +36,6 @@ __all__ = [
     "AccountIn",
     "AccountOut",
     "AnalyticsOut",
-    "AnswerModel",
-    "Area",
     "AuditOut",
     "CommandIn",
     "CommandWord",
@@ -52,7 +51,6 @@ __all__ = [
     "MissionPhase",
     "NavigationIn",
     "RefusalOut",
-    "RequestModel",
     "RobotOut",
     "Role",
     "Scope",
@@ -69,29 +67,12 @@ __all__ = [
     "word_for",
 ]
 
-Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
-Area = Annotated[list[tuple[Number, Number]], Field(min_length=3, max_length=100)]
-"""A polygon's corners (east, north) in metres of the provider's local frame."""
 _MOST_ROBOTS = 64
 _MOST_WAYPOINTS = 1000
 _MOST_INDEX = 10_000
-_MOST_MINUTES = 24 * 60
 _YEAR_DAYS = 366
 _MOST_STORED = 2**63 - 1
 """Largest whole number that a database holds."""
-
-
-class RequestModel(BaseModel):
-    """Base of requests: unknown keys are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class AnswerModel(BaseModel):
-    """Base of answers; a stored row becomes one by its attributes of the same names."""
-
-    model_config = ConfigDict(frozen=True, from_attributes=True)
 
 
 class Role(str, enum.Enum):
@@ -287,7 +268,7 @@ class LeaseIn(RequestModel):
     """East and north."""
     battery_minutes: Positive | None = None
     """Minutes that the charge must last, for any one."""
-    minutes: Annotated[float, Field(gt=0, le=_MOST_MINUTES)] = 15.0
+    minutes: Minutes = 15.0
     area: Area | None = None
     """Where the drones will stay; intersected with the provider's fence."""
 
@@ -332,7 +313,7 @@ class MissionIn(RequestModel):
     document: MissionDocument
     lease: str | None = None
     """None: one for the document's robots is requested with it, and given back after it."""
-    minutes: Annotated[float, Field(gt=0, le=_MOST_MINUTES)] = 15.0
+    minutes: Minutes = 15.0
     """Of the lease that is requested with it."""
     silence: SilencePolicy = SilencePolicy.CONTINUE
     silence_seconds: Annotated[float, Field(ge=1, le=3600)] = 30.0

@@ -12,7 +12,8 @@ from typing_extensions import Self
 
 from aerodaas.dataflow.mission_document import DocumentWaypoint
 from aerodaas.extensions.surveys.planning import MOST_CORNERS
-from aerodaas.protocol.schemas import AnswerModel, Number, RequestModel, Word
+from aerodaas.protocol.base import AnswerModel, Number, RequestModel
+from aerodaas.protocol.schemas import Word
 
 __all__ = ["SurveyIn", "SurveyOut", "SurveyPhotosOut"]
 

@@ -13,8 +13,8 @@ from aerodaas.geometry.depth import METRE
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Header
 from aerodaas.messages.waypoints import FollowedTarget
+from aerodaas.protocol.base import AnswerModel
 from aerodaas.protocol.live import DepthItem, PictureItem, TargetItem
-from aerodaas.protocol.schemas import AnswerModel
 from aerodaas.terrain.ground import Ground
 
 __all__ = ["depth_picture", "packed_depth", "packed_picture", "packed_places", "packed_target"]
